@@ -1,0 +1,1 @@
+//! RGB working space and tone curves.

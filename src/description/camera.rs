@@ -1,0 +1,95 @@
+//! Cameras, as a scene file says them.
+
+use serde::Deserialize;
+
+/// A camera at its local origin which looks along its local −z with +y up. `R` refers to an entity.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[serde(bound(deserialize = "Focus<R>: Deserialize<'de>"))]
+pub struct Camera<R> {
+    /// Vertical field of view in degrees, in `(0, 180)`. Not used by an orthographic camera.
+    #[serde(default = "default_fov")]
+    pub fov: f64,
+    /// Height of the visible field in metres; makes the camera orthographic.
+    #[serde(default)]
+    pub orthographic: Option<f64>,
+    /// Radius of the lens in metres; 0 is a pinhole. Excludes `f_number`.
+    #[serde(default)]
+    pub aperture: f64,
+    /// Aperture as an f-number on a sensor 24 mm high. Excludes `aperture`.
+    #[serde(default)]
+    pub f_number: Option<f64>,
+    /// What is sharp: the plane at this distance along the axis, or through this entity's origin.
+    #[serde(default)]
+    pub focus: Option<Focus<R>>,
+    /// Blades of the diaphragm: 0 is a round aperture, otherwise a regular polygon of 3 or more.
+    #[serde(default)]
+    pub blades: u32,
+    /// Turns the polygon, degrees.
+    #[serde(default)]
+    pub blade_rotation: f64,
+}
+
+/// The height of the sensor to which [`Camera::f_number`] refers, in metres (36 mm × 24 mm film).
+pub const SENSOR_HEIGHT: f64 = 0.024;
+
+/// What a lens is focused on. In a scene file: a number, or the name of an entity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Focus<R> {
+    /// Axial distance in metres.
+    Distance(f64),
+    /// The origin of this entity, wherever it moves.
+    Entity(R),
+}
+
+impl<R> Default for Camera<R> {
+    fn default() -> Self {
+        Self {
+            fov: default_fov(),
+            orthographic: None,
+            aperture: 0.0,
+            f_number: None,
+            focus: None,
+            blades: 0,
+            blade_rotation: 0.0,
+        }
+    }
+}
+
+impl<R> Camera<R> {
+    /// Radius of the lens in metres for the vertical field of view `fov_deg`.
+    ///
+    /// With an f-number `N` the focal length is `f = h / (2 tan(fov/2))`, `h` the height of the
+    /// sensor, and the radius `f / (2 N)`.
+    pub fn lens_radius(&self, fov_deg: f64) -> f64 {
+        match self.f_number {
+            Some(n) => SENSOR_HEIGHT / (2.0 * (fov_deg.to_radians() * 0.5).tan()) / (2.0 * n),
+            None => self.aperture,
+        }
+    }
+
+    /// The same camera with its reference replaced.
+    ///
+    /// # Errors
+    /// Whatever `f` returns.
+    pub fn map_ref<S, E>(self, f: impl FnOnce(R) -> Result<S, E>) -> Result<Camera<S>, E> {
+        let focus = match self.focus {
+            None => None,
+            Some(Focus::Distance(metres)) => Some(Focus::Distance(metres)),
+            Some(Focus::Entity(reference)) => Some(Focus::Entity(f(reference)?)),
+        };
+        Ok(Camera {
+            fov: self.fov,
+            orthographic: self.orthographic,
+            aperture: self.aperture,
+            f_number: self.f_number,
+            focus,
+            blades: self.blades,
+            blade_rotation: self.blade_rotation,
+        })
+    }
+}
+
+fn default_fov() -> f64 {
+    40.0
+}

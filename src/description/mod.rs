@@ -1,0 +1,23 @@
+//! Scene files to plain, validated data: no ECS, no rendering.
+
+mod camera;
+mod light;
+mod material;
+mod motion;
+mod scene;
+mod settings;
+mod shape;
+mod texture;
+mod value;
+
+pub use camera::{Camera, Focus, SENSOR_HEIGHT};
+pub use light::{Emission, EmissionStrength, Light};
+pub use material::{Attenuation, Material, Metal};
+pub use motion::{
+    Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
+};
+pub use scene::{EntityDescription, SceneDescription};
+pub use settings::{Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
+pub use shape::{Shape, TriangleMesh};
+pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};
+pub use value::{Rgb, Value};

@@ -1,0 +1,63 @@
+//! A whole scene as plain, validated data.
+
+use super::{
+    Acceleration, Camera, Clock, Emission, ImageData, Keyframes, Light, LookAt, Material,
+    RenderSettings, Shape, Texture, Transform, TriangleMesh, Velocity,
+};
+use indexmap::IndexMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A scene: everything that `load_scene` found, checked, with every named file read.
+///
+/// All references are names which exist; all numbers are finite and in range.
+#[derive(Clone, Debug, Default)]
+pub struct SceneDescription {
+    /// The scene file and everything it includes and names, in the order of reading.
+    pub files: Vec<PathBuf>,
+    /// XXH3-128 over the bytes of all those files and their names.
+    pub content_hash: u128,
+    /// Frames and shutter.
+    pub clock: Clock,
+    /// Settings of the render.
+    pub render: RenderSettings,
+    /// The name of the camera entity to look through; there is always one.
+    pub camera: String,
+    /// Textures by name, with their images decoded.
+    pub textures: IndexMap<String, Texture<Arc<ImageData>>>,
+    /// Materials by name.
+    pub materials: IndexMap<String, Material<String>>,
+    /// Meshes by name.
+    pub meshes: IndexMap<String, Arc<TriangleMesh>>,
+    /// Entities by name, in the order of the file.
+    pub entities: IndexMap<String, EntityDescription>,
+}
+
+/// An entity: its components, each optional.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EntityDescription {
+    /// The entity in whose frame this one moves.
+    pub parent: Option<String>,
+    /// Pose at time 0.
+    pub transform: Option<Transform>,
+    /// Keeps it aimed at a point.
+    pub look_at: Option<LookAt>,
+    /// Uniform motion.
+    pub velocity: Option<Velocity>,
+    /// Constant acceleration.
+    pub acceleration: Option<Acceleration>,
+    /// Tracks over time.
+    pub keyframes: Option<Keyframes>,
+    /// Its form.
+    pub shape: Option<Shape<String>>,
+    /// The name of what it is made of.
+    pub material: Option<String>,
+    /// The light that its surface emits.
+    pub emission: Option<Emission<String>>,
+    /// A light without a shape.
+    pub light: Option<Light<String>>,
+    /// A camera.
+    pub camera: Option<Camera<String>>,
+    /// Seen by the camera's own rays (mirrors and shadows see everything).
+    pub hidden_from_camera: bool,
+}

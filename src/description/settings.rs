@@ -1,0 +1,170 @@
+//! The clock and the settings of a render.
+
+use serde::{Deserialize, Serialize};
+
+/// The frames of a scene and when they are taken.
+///
+/// Frame `n` opens at `t = n / fps` seconds; the shutter is an interval from there, in fractions of
+/// a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Clock {
+    /// Frames per second.
+    pub fps: f64,
+    /// First and last frame, both included.
+    pub frames: (u32, u32),
+    /// When the shutter opens and closes, in fractions of a frame after the frame's time; 0.5 is
+    /// film's 180°.
+    pub shutter: (f64, f64),
+}
+
+impl Default for Clock {
+    fn default() -> Self {
+        Self { fps: 24.0, frames: (0, 0), shutter: (0.0, 0.5) }
+    }
+}
+
+/// Everything that trades accuracy for speed, and the shape of the picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RenderSettings {
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Samples per pixel. Trades noise for time: the error falls with the square root.
+    pub samples: u32,
+    /// Greatest number of surface interactions of a path. Trades the light of longer paths (bias)
+    /// for time; 1 is direct light alone.
+    pub max_depth: u32,
+    /// Interactions before Russian roulette may end a path. Trades variance for time; no bias.
+    pub roulette_depth: u32,
+    /// How light is simulated.
+    pub integrator: IntegratorChoice,
+    /// Seed of every random decision.
+    pub seed: u64,
+    /// The pixel filter.
+    pub filter: Filter,
+    /// Upper limit of the radiance that one sample may bring after its first bounce, per channel.
+    /// Trades energy (bias) for fewer bright specks; off by default.
+    pub clamp_indirect: Option<f32>,
+    /// How far, in pixels, interpolated motion may stray from the true motion. Trades exactness of
+    /// curved motion blur for motion keys.
+    pub motion_tolerance: f64,
+    /// Exposure in stops: the picture is multiplied by `2^exposure` before the tone curve.
+    pub exposure: f32,
+    /// The tone curve of the PNG; the EXR stays linear.
+    pub tonemap: ToneMap,
+    /// What the EXR holds.
+    pub layers: Vec<Layer>,
+    /// Bits per channel of the beauty layers in the EXR: 16 or 32.
+    pub exr_bits: u32,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            size: (640, 480),
+            samples: 64,
+            max_depth: 64,
+            roulette_depth: 4,
+            integrator: IntegratorChoice::Auto,
+            seed: 0,
+            filter: Filter::default(),
+            clamp_indirect: None,
+            motion_tolerance: 0.0625,
+            exposure: 0.0,
+            tonemap: ToneMap::Srgb,
+            layers: vec![Layer::Beauty],
+            exr_bits: 32,
+        }
+    }
+}
+
+/// The integrators by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum IntegratorChoice {
+    /// Picks by what the scene requires, and says why.
+    #[default]
+    Auto,
+    /// Unidirectional path tracing.
+    Path,
+}
+
+/// Pixel filters, in pixels; sampled by importance, so that each sample has weight 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Filter {
+    /// Constant over a square of side `2·radius`.
+    Box {
+        /// Half the side.
+        #[serde(default = "box_radius")]
+        radius: f32,
+    },
+    /// A Gaussian, cut off at `radius`, per axis.
+    Gaussian {
+        /// Standard deviation.
+        #[serde(default = "gaussian_sigma")]
+        sigma: f32,
+        /// Where it ends.
+        #[serde(default = "gaussian_radius")]
+        radius: f32,
+    },
+    /// The four-term Blackman–Harris window over `[−radius, radius]`, per axis.
+    BlackmanHarris {
+        /// Where it ends.
+        #[serde(default = "gaussian_radius")]
+        radius: f32,
+    },
+}
+
+impl Default for Filter {
+    fn default() -> Self {
+        Self::Gaussian { sigma: gaussian_sigma(), radius: gaussian_radius() }
+    }
+}
+
+/// Tone curves of the PNG.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum ToneMap {
+    /// No curve but sRGB's own; values above 1 are clipped.
+    #[default]
+    Srgb,
+    /// Troy Sobotka's AgX: bright colours fade to white gently.
+    Agx,
+    /// The fit of the ACES film curve by Narkowicz 2015.
+    Aces,
+    /// Reinhard et al. 2002 on luminance.
+    Reinhard,
+}
+
+/// Layers of the EXR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Layer {
+    /// Linear radiance.
+    Beauty,
+    /// Reflectance at the first surface.
+    Albedo,
+    /// Shading normal at the first surface, world space.
+    Normal,
+    /// Distance along the camera's axis to the first surface, metres.
+    Depth,
+    /// Position of the first surface, metres, world space.
+    Position,
+    /// Motion of the first surface over the shutter, pixels.
+    Motion,
+    /// Index of the object at the first surface, in the order of names; 0 is none.
+    ObjectId,
+    /// Number of samples.
+    Samples,
+    /// Variance of the pixel's mean per channel.
+    Variance,
+}
+
+fn box_radius() -> f32 {
+    0.5
+}
+fn gaussian_sigma() -> f32 {
+    0.5
+}
+fn gaussian_radius() -> f32 {
+    1.5
+}

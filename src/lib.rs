@@ -1,0 +1,11 @@
+//! Kinora renders animated scenes by simulating light.
+
+pub mod color;
+pub mod description;
+pub mod film;
+pub mod frame;
+pub mod math;
+pub mod output;
+pub mod sampling;
+pub mod shade;
+pub mod world;

@@ -1,0 +1,11 @@
+//! Frames, bounds, rounding bounds and rigid motion: geometry that knows nothing of light.
+
+mod bounds;
+mod frame;
+
+mod rounding;
+
+pub use bounds::Aabb;
+pub use frame::Frame;
+
+pub use rounding::{gamma, gamma_f64, next_after_magnitude, offset_ray_origin};

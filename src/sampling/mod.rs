@@ -1,0 +1,1 @@
+//! Random and low-discrepancy streams, warps, tabulated distributions, MIS weights.

@@ -1,0 +1,1 @@
+//! From a point on a surface to how it scatters light.

@@ -1,0 +1,1 @@
+//! Components and resources, and spawning a description into a world.
