@@ -9,7 +9,9 @@ use serde::Deserialize;
 /// `α = roughness²`; 0 is perfectly smooth.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[serde(bound(deserialize = "R: Deserialize<'de>, Value<Rgb, R>: Deserialize<'de>, Value<f32, R>: Deserialize<'de>"))]
+#[serde(bound(
+    deserialize = "R: Deserialize<'de>, Value<Rgb, R>: Deserialize<'de>, Value<f32, R>: Deserialize<'de>"
+))]
 pub enum Material<R> {
     /// Lambert's ideal diffuse reflector.
     Diffuse {

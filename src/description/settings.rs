@@ -46,8 +46,8 @@ pub struct RenderSettings {
     /// Upper limit of the radiance that one sample may bring after its first bounce, per channel.
     /// Trades energy (bias) for fewer bright specks; off by default.
     pub clamp_indirect: Option<f32>,
-    /// How far, in pixels, interpolated motion may stray from the true motion. Trades exactness of
-    /// curved motion blur for motion keys.
+    /// How far interpolated motion may stray from the true motion, as a fraction of the distance
+    /// that the object moves during the shutter. Trades the shape of curved blur for motion keys.
     pub motion_tolerance: f64,
     /// Exposure in stops: the picture is multiplied by `2^exposure` before the tone curve.
     pub exposure: f32,
@@ -70,7 +70,7 @@ impl Default for RenderSettings {
             seed: 0,
             filter: Filter::default(),
             clamp_indirect: None,
-            motion_tolerance: 0.0625,
+            motion_tolerance: 0.001,
             exposure: 0.0,
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],

@@ -95,10 +95,21 @@ impl<I> Texture<I> {
     ///
     /// # Errors
     /// Whatever `f` returns.
-    pub fn map_image<J, E>(self, f: impl FnOnce(I, Encoding) -> Result<J, E>) -> Result<Texture<J>, E> {
+    pub fn map_image<J, E>(
+        self,
+        f: impl FnOnce(I, Encoding) -> Result<J, E>,
+    ) -> Result<Texture<J>, E> {
         Ok(match self {
             Self::Image { file, encoding, wrap, filter, channel, repeat, offset } => {
-                Texture::Image { file: f(file, encoding)?, encoding, wrap, filter, channel, repeat, offset }
+                Texture::Image {
+                    file: f(file, encoding)?,
+                    encoding,
+                    wrap,
+                    filter,
+                    channel,
+                    repeat,
+                    offset,
+                }
             }
             Self::Checker { size, a, b } => Texture::Checker { size, a, b },
         })

@@ -66,9 +66,9 @@ impl<'de> Deserialize<'de> for Value<Rgb, String> {
             fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self::Value, A::Error> {
                 let mut rgb = [0.0_f32; 3];
                 for (channel, slot) in rgb.iter_mut().enumerate() {
-                    *slot = seq
-                        .next_element()?
-                        .ok_or_else(|| de::Error::invalid_length(channel, &"three numbers (r, g, b)"))?;
+                    *slot = seq.next_element()?.ok_or_else(|| {
+                        de::Error::invalid_length(channel, &"three numbers (r, g, b)")
+                    })?;
                 }
                 if seq.next_element::<f32>()?.is_some() {
                     return Err(de::Error::invalid_length(4, &"three numbers (r, g, b)"));

@@ -84,9 +84,14 @@ mod tests {
                 for dir in [n32, -n32] {
                     let o = offset_ray_origin(p, DVec3::splat(scale * 1e-12), n32, dir);
                     let distance = (o.as_dvec3() - p).dot(n32.as_dvec3());
-                    assert!(distance * f64::from(dir.dot(n32)) > 0.0, "scale 2^{exponent}, k = {k}");
+                    assert!(
+                        distance * f64::from(dir.dot(n32)) > 0.0,
+                        "scale 2^{exponent}, k = {k}"
+                    );
                     // and not farther than a few units in the last place of the point
-                    assert!(distance.abs() <= 4.0 * p.abs().max_element() * f64::from(f32::EPSILON));
+                    assert!(
+                        distance.abs() <= 4.0 * p.abs().max_element() * f64::from(f32::EPSILON)
+                    );
                 }
             }
         }

@@ -1,1 +1,11 @@
 //! Components and resources, and spawning a description into a world.
+
+mod components;
+mod resources;
+
+pub use components::{
+    Acceleration, ActiveCamera, Camera, ChildOf, Children, Emission, EmissionFactor,
+    HiddenFromCamera, Keyframes, Light, LocalPose, LookAt, MadeOf, Material, Mesh, Name, Optics,
+    Shape, ShutterMotion, Texture, Transform, Velocity, WorldTransform,
+};
+pub use resources::{FrameClock, SceneTime, Settings};
