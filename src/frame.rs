@@ -6,6 +6,19 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64};
 
+/// The stages of one frame, in order. A stage reads only what earlier stages wrote.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FrameSystems {
+    /// Where everything is over the shutter.
+    Step,
+    /// What changed is copied into flat arrays.
+    Extract,
+    /// Acceleration structures and light tables over those arrays.
+    Build,
+    /// Light is simulated.
+    Integrate,
+}
+
 /// How a caller watches and stops a render. Cheap to clone; every clone is the same control.
 #[derive(Clone, Debug, Default, Resource)]
 pub struct RenderControl {

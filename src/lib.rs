@@ -8,4 +8,5 @@ pub mod math;
 pub mod output;
 pub mod sampling;
 pub mod shade;
+pub mod step;
 pub mod world;

@@ -1,0 +1,388 @@
+//! As many poses over the shutter as a motion needs.
+//!
+//! The pose systems are asked at evenly spaced times from opening to closing. An entity keeps the
+//! smallest number of segments (a power of two) whose interpolation, [`Decomposed::interpolate`],
+//! passes through all the other samples within a tolerance: one key for what stands still, two for
+//! a straight line or a uniform rotation, more for an arc. While some entity is not satisfied the
+//! grid is doubled.
+//!
+//! Sampling alone cannot see whole turns: a wheel which makes one turn between two samples looks at
+//! rest. The angular speeds of velocities and tracks, summed along the ancestors, are therefore
+//! turned into a least number of segments of at most 30°.
+
+use super::pose::{angular_speed_bound, evaluate_optics_at, mean_emission_factor};
+use crate::math::Decomposed;
+use crate::world::{
+    Camera, ChildOf, EmissionFactor, FrameClock, Keyframes, Optics, SceneTime, Settings,
+    ShutterMotion, Velocity, WorldTransform,
+};
+use bevy_ecs::entity::EntityHashMap;
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DMat3, DVec3};
+
+/// The widest rotation between two keys for which a path of nearly one turn cannot be mistaken for
+/// a small one in the other direction.
+const WIDEST_TURN: f64 = std::f64::consts::PI / 6.0;
+/// Segments of the coarsest grid; three samples lie between the ends.
+const COARSEST_GRID: usize = 4;
+/// Segments of the finest grid. A motion which needs more is given these.
+const FINEST_GRID: usize = 4096;
+/// Segments over which keyed fields of view and focus distances are joined by straight lines.
+const OPTICS_SEGMENTS: usize = 16;
+/// Motion below this share of a coordinate is rounding noise of the matrix products in `f64`.
+const NOISE: f64 = f64::EPSILON * 4096.0;
+
+/// Runs the pose systems over the shutter and writes [`ShutterMotion`], [`Optics`] and
+/// [`EmissionFactor`] where they are different from before.
+///
+/// Afterwards the world stands as it does when the shutter opens.
+pub fn sample_shutter(world: &mut World) {
+    let (open, close) = world.resource::<FrameClock>().shutter();
+    let tolerance = world.resource::<Settings>().0.motion_tolerance;
+    let least = least_segments(world, close - open);
+    let most_turning = least.values().copied().max().unwrap_or(1);
+    let mut grid = if close > open {
+        (2 * most_turning.next_power_of_two()).clamp(COARSEST_GRID, FINEST_GRID)
+    } else {
+        0
+    };
+    let motions = loop {
+        let samples = sample_poses(world, open, close, grid);
+        let mut satisfied = true;
+        let motions: Vec<(Entity, ShutterMotion)> = samples
+            .into_iter()
+            .map(|(entity, poses)| {
+                let least = least.get(&entity).copied().unwrap_or(1);
+                let (keys, enough) = fewest_keys(&poses, least, tolerance);
+                satisfied &= enough;
+                (entity, ShutterMotion { keys })
+            })
+            .collect();
+        if satisfied || grid >= FINEST_GRID {
+            break motions;
+        }
+        grid *= 2;
+    };
+    for (entity, motion) in motions {
+        if let Some(mut old) = world.get_mut::<ShutterMotion>(entity) {
+            old.set_if_neq(motion);
+        }
+    }
+    sample_optics(world, open, close);
+    sample_emission(world, open, close);
+}
+
+/// The poses of every entity at `grid + 1` times, or at the opening alone when `grid` is 0.
+fn sample_poses(
+    world: &mut World,
+    open: f64,
+    close: f64,
+    grid: usize,
+) -> EntityHashMap<Vec<DAffine3>> {
+    let mut samples: EntityHashMap<Vec<DAffine3>> = EntityHashMap::default();
+    let mut poses = world.query::<(Entity, &WorldTransform)>();
+    // Backwards, so that the world is left at the opening.
+    for k in (0..=grid).rev() {
+        let share = if grid == 0 { 0.0 } else { k as f64 / grid as f64 };
+        world.resource_mut::<SceneTime>().seconds = open + (close - open) * share;
+        world.run_schedule(super::Pose);
+        for (entity, pose) in poses.iter(world) {
+            samples.entry(entity).or_default().push(pose.0);
+        }
+    }
+    for poses in samples.values_mut() {
+        poses.reverse();
+    }
+    samples
+}
+
+/// The least number of segments for the turns of each entity that turns, its ancestors included.
+fn least_segments(world: &mut World, duration: f64) -> EntityHashMap<usize> {
+    let mut turning = world.query_filtered::<
+        (Entity, Option<&Velocity>, Option<&Keyframes>),
+        Or<(With<Velocity>, With<Keyframes>)>,
+    >();
+    let own: EntityHashMap<f64> = turning
+        .iter(world)
+        .map(|(entity, velocity, keys)| (entity, angular_speed_bound(velocity, keys)))
+        .filter(|(_, speed)| *speed > 0.0)
+        .collect();
+    if own.is_empty() {
+        return EntityHashMap::default();
+    }
+    let mut placed = world.query_filtered::<Entity, With<WorldTransform>>();
+    let entities: Vec<Entity> = placed.iter(world).collect();
+    let mut least = EntityHashMap::default();
+    for entity in entities {
+        let mut speed = 0.0;
+        let mut ancestor = Some(entity);
+        while let Some(current) = ancestor {
+            speed += own.get(&current).copied().unwrap_or(0.0);
+            ancestor = world.get::<ChildOf>(current).map(ChildOf::parent);
+        }
+        let segments = (speed * duration / WIDEST_TURN).ceil();
+        if segments > 1.0 {
+            least.insert(entity, segments.min(FINEST_GRID as f64) as usize);
+        }
+    }
+    least
+}
+
+/// The poses to keep, and whether they describe the motion within the tolerance.
+fn fewest_keys(poses: &[DAffine3], least: usize, tolerance: f64) -> (Vec<DAffine3>, bool) {
+    let grid = poses.len() - 1;
+    let Some(first) = poses.first() else { return (Vec::new(), true) };
+    if least <= 1 && poses.iter().all(|pose| pose == first) {
+        return (vec![*first], true);
+    }
+    let allowed = Allowance::of(poses, tolerance);
+    let split: Vec<Decomposed> = poses.iter().map(Decomposed::new).collect();
+    let mut segments = least.next_power_of_two().min(grid);
+    // A grid that is used up has no samples left to test against.
+    while segments < grid {
+        let stride = grid / segments;
+        let fits = (0..grid).all(|k| {
+            let (a, between) = (k / stride * stride, k % stride);
+            let share = between as f64 / stride as f64;
+            between == 0
+                || allowed.covers(&split[a].interpolate(&split[a + stride], share), &poses[k])
+        });
+        if fits {
+            return (poses.iter().step_by(stride).copied().collect(), true);
+        }
+        segments *= 2;
+    }
+    (poses.to_vec(), false)
+}
+
+/// How far an interpolated pose may lie from the true one.
+struct Allowance {
+    translation: f64,
+    linear: f64,
+}
+
+impl Allowance {
+    fn of(poses: &[DAffine3], tolerance: f64) -> Self {
+        let first = poses[0];
+        let mut moved = (0.0_f64, 0.0_f64);
+        let mut size = (0.0_f64, 0.0_f64);
+        for pose in poses {
+            moved.0 = moved.0.max(pose.translation.distance(first.translation));
+            moved.1 = moved.1.max(largest(pose.matrix3 - first.matrix3));
+            size.0 = size.0.max(pose.translation.length());
+            size.1 = size.1.max(largest(pose.matrix3));
+        }
+        Self {
+            translation: tolerance * moved.0 + NOISE * size.0,
+            linear: tolerance * moved.1 + NOISE * size.1,
+        }
+    }
+
+    fn covers(&self, interpolated: &DAffine3, true_pose: &DAffine3) -> bool {
+        let translation: DVec3 = interpolated.translation - true_pose.translation;
+        translation.length() <= self.translation
+            && largest(interpolated.matrix3 - true_pose.matrix3) <= self.linear
+    }
+}
+
+fn largest(m: DMat3) -> f64 {
+    m.to_cols_array().into_iter().fold(0.0, |a, x| a.max(x.abs()))
+}
+
+/// Writes the [`Optics`] of every camera.
+fn sample_optics(world: &mut World, open: f64, close: f64) {
+    let mut cameras = world.query::<(Entity, &Camera, Option<&Keyframes>)>();
+    let sampled: Vec<(Entity, Optics)> = cameras
+        .iter(world)
+        .map(|(entity, camera, keyframes)| {
+            let mut optics = Optics::default();
+            for k in 0..=OPTICS_SEGMENTS {
+                let share = k as f64 / OPTICS_SEGMENTS as f64;
+                let (fov, focus) =
+                    evaluate_optics_at(open + (close - open) * share, camera, keyframes);
+                optics.fov_deg.push(fov);
+                optics.focus.extend(focus);
+            }
+            for values in [&mut optics.fov_deg, &mut optics.focus] {
+                if values.windows(2).all(|pair| pair[0] == pair[1]) {
+                    values.truncate(1);
+                }
+            }
+            (entity, optics)
+        })
+        .collect();
+    for (entity, optics) in sampled {
+        if world.get::<Optics>(entity) != Some(&optics) {
+            world.entity_mut(entity).insert(optics);
+        }
+    }
+}
+
+/// Writes the [`EmissionFactor`] of everything whose emission is keyed.
+fn sample_emission(world: &mut World, open: f64, close: f64) {
+    let mut keyed = world.query::<(Entity, &Keyframes)>();
+    let factors: Vec<(Entity, EmissionFactor)> = keyed
+        .iter(world)
+        .filter_map(|(entity, keys)| Some((entity, mean_emission_factor(keys, open, close)?)))
+        .collect();
+    for (entity, factor) in factors {
+        if world.get::<EmissionFactor>(entity) != Some(&factor) {
+            world.entity_mut(entity).insert(factor);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::{Clock, RenderSettings, Transform};
+    use crate::math::MotionTransform;
+    use crate::step::PoseSystems;
+
+    /// A world with the step stage alone, its shutter open for `seconds` from time 0.
+    fn world_with_shutter(seconds: f64) -> (World, Schedule) {
+        let mut world = World::new();
+        let clock = Clock { fps: 1.0, frames: (0, 10), shutter: (0.0, seconds) };
+        world.insert_resource(FrameClock { clock, frame: 0 });
+        world.insert_resource(Settings(RenderSettings::default()));
+        let mut frame = Schedule::default();
+        crate::step::install(&mut world, &mut frame);
+        (world, frame)
+    }
+
+    fn keys(world: &World, entity: Entity) -> &[DAffine3] {
+        &world.get::<ShutterMotion>(entity).expect("every placed entity has one").keys
+    }
+
+    /// One key at rest, two on a line and in a uniform rotation about the own origin.
+    #[test]
+    fn simple_motion_needs_few_keys() {
+        let (mut world, mut frame) = world_with_shutter(0.5);
+        let rest = world.spawn(Transform::default()).id();
+        let line = world.spawn(Velocity { linear: DVec3::X, ..Velocity::default() }).id();
+        let slow = Velocity { angular: DVec3::Y * 0.9, ..Velocity::default() };
+        let turn = world.spawn(slow).id();
+        frame.run(&mut world);
+        assert_eq!(keys(&world, rest).len(), 1);
+        assert_eq!(keys(&world, line).len(), 2);
+        assert_eq!(keys(&world, turn).len(), 2);
+        assert_eq!(keys(&world, line)[1].translation, DVec3::X * 0.5);
+        // shutter closed: nothing moves
+        world.resource_mut::<FrameClock>().clock.shutter = (0.0, 0.0);
+        frame.run(&mut world);
+        assert_eq!(keys(&world, line).len(), 1);
+    }
+
+    /// Oracle: with acceleration `a` over `T` a chord of `1/S` of it strays by `a·T²/(8·S²)`.
+    #[test]
+    fn accelerated_motion_is_followed_within_the_tolerance() {
+        let (mut world, mut frame) = world_with_shutter(1.0);
+        let body = world.spawn(crate::world::Acceleration(DVec3::X * 2.0)).id();
+        frame.run(&mut world);
+        // 2/(8 S²) ≤ 0.001 · 1 m  ⇒  S ≥ 15.8
+        assert_eq!(keys(&world, body).len(), 17);
+    }
+
+    /// Ten whole turns within the shutter are neither lost nor slowed down: every pose between the
+    /// keys is the rotation by the true angle.
+    #[test]
+    fn whole_turns_are_counted() {
+        let (mut world, mut frame) = world_with_shutter(0.5);
+        let speed = 20.0 * std::f64::consts::TAU;
+        let wheel = world.spawn(Velocity { angular: DVec3::Z * speed, ..Velocity::default() }).id();
+        frame.run(&mut world);
+        let motion = MotionTransform::new(keys(&world, wheel));
+        for k in 0..=997_u16 {
+            let u = f32::from(k) / 997.0;
+            let angle = speed * 0.5 * f64::from(u);
+            let expected = DVec3::new(angle.cos(), angle.sin(), 0.0);
+            let got = motion.at(u).transform_vector3(DVec3::X);
+            assert!((got - expected).length() < 1e-4, "u = {u}");
+        }
+    }
+
+    /// Oracle: the same motion written as one entity. A wheel on a cart which accelerates.
+    #[test]
+    fn a_moving_child_of_a_moving_parent_equals_the_motion_flattened() {
+        let (mut world, mut frame) = world_with_shutter(0.5);
+        let cart = world
+            .spawn((
+                Velocity { linear: DVec3::X * 3.0, angular: DVec3::Y * 0.7 },
+                crate::world::Acceleration(DVec3::X),
+            ))
+            .id();
+        let wheel = world
+            .spawn((
+                Transform { translation: DVec3::new(0.0, 0.3, 1.0), ..Transform::default() },
+                Velocity { angular: DVec3::Z * 9.0, ..Velocity::default() },
+                ChildOf(cart),
+            ))
+            .id();
+        frame.run(&mut world);
+        let motion = MotionTransform::new(keys(&world, wheel));
+        for k in 0..=100_u8 {
+            let u = f32::from(k) / 100.0;
+            let t = 0.5 * f64::from(u);
+            let cart = DAffine3::from_rotation_translation(
+                glam::DQuat::from_rotation_y(0.7 * t),
+                DVec3::X * (3.0 * t + 0.5 * t * t),
+            );
+            let own = DAffine3::from_rotation_translation(
+                glam::DQuat::from_rotation_z(9.0 * t),
+                DVec3::new(0.0, 0.3, 1.0),
+            );
+            let expected = cart * own;
+            let p = DVec3::new(0.3, 0.0, 0.0);
+            let error = motion.at(u).transform_point3(p) - expected.transform_point3(p);
+            // the tolerance is 0.001 of the distance moved, at most 1.7 m here
+            assert!(error.length() < 2.0e-3, "u = {u}: {error}");
+        }
+    }
+
+    /// A system of a program moves things by writing transforms; it is asked at several instants and
+    /// its blur follows the arc. Oracle: a pendulum stays on its circle.
+    #[test]
+    fn custom_systems_get_motion_blur() {
+        #[derive(Component)]
+        struct Pendulum;
+        fn swing(time: Res<SceneTime>, mut bobs: Query<&mut Transform, With<Pendulum>>) {
+            for mut bob in &mut bobs {
+                let angle = (time.seconds * 4.0).cos();
+                bob.translation = DVec3::new(angle.sin(), -angle.cos(), 0.0);
+            }
+        }
+        let (mut world, mut frame) = world_with_shutter(0.5);
+        world.schedule_scope(super::super::Pose, |_, poses| {
+            poses.add_systems(swing.in_set(PoseSystems::Custom));
+        });
+        let bob = world.spawn((Transform::default(), Pendulum)).id();
+        frame.run(&mut world);
+        let motion = MotionTransform::new(keys(&world, bob));
+        assert!(!motion.is_static());
+        for k in 0..=50_u8 {
+            let p = motion.at(f32::from(k) / 50.0).translation;
+            assert!((p.length() - 1.0).abs() < 2e-3, "{p}");
+        }
+        // the world is left at shutter opening
+        let opening = world.get::<Transform>(bob).expect("spawned above").translation;
+        assert!((opening - DVec3::new(1.0_f64.sin(), -1.0_f64.cos(), 0.0)).length() < 1e-12);
+    }
+
+    /// Frame 7 gives the same keys alone and after the frames before it.
+    #[test]
+    fn frames_do_not_depend_on_those_before() {
+        let run = |frames: &[u32]| {
+            let (mut world, mut schedule) = world_with_shutter(0.5);
+            let spin = Velocity { linear: DVec3::Y, angular: DVec3::new(0.3, 2.0, 0.1) };
+            let parent = world.spawn(spin).id();
+            let body = world.spawn((spin, ChildOf(parent))).id();
+            for &frame in frames {
+                world.resource_mut::<FrameClock>().frame = frame;
+                schedule.run(&mut world);
+                world.clear_trackers();
+            }
+            keys(&world, body).to_vec()
+        };
+        assert_eq!(run(&[7]), run(&[0, 3, 7]));
+    }
+}
