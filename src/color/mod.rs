@@ -40,7 +40,9 @@ mod tests {
     /// weights w solve Σ wᵢ·(xᵢ/yᵢ, 1, zᵢ/yᵢ) = (X, 1, Z) of the white.
     #[test]
     fn luminance_weights_follow_from_the_primaries() {
-        let xyz = |(x, y): (f32, f32)| glam::DVec3::new(f64::from(x / y), 1.0, f64::from((1.0 - x - y) / y));
+        let xyz = |(x, y): (f32, f32)| {
+            glam::DVec3::new(f64::from(x / y), 1.0, f64::from((1.0 - x - y) / y))
+        };
         let [r, g, b, white] = CHROMATICITIES.map(xyz);
         let weights = glam::DMat3::from_cols(r, g, b).inverse() * white;
         assert!((weights.as_vec3() - LUMINANCE_WEIGHTS).abs().max_element() < 5.1e-5, "{weights}");

@@ -74,7 +74,8 @@ mod tests {
     /// Values of the standard's formula, computed with 30 digits elsewhere.
     #[test]
     fn known_values_are_met() {
-        for (linear, display) in [(0.18, 0.461_356_1), (0.5, 0.735_357), (0.003_130_8, 0.040_449_9)] {
+        for (linear, display) in [(0.18, 0.461_356_1), (0.5, 0.735_357), (0.003_130_8, 0.040_449_9)]
+        {
             assert!((encode(linear) - display).abs() < 1e-6, "{linear}: {}", encode(linear));
         }
         assert_eq!(encode_u8(0.18), 118);
@@ -86,7 +87,9 @@ mod tests {
     fn decoding_inverts_encoding_everywhere() {
         for i in 0..=10_000 {
             let linear = i as f32 / 10_000.0;
-            assert!((decode(encode(linear)) - linear).abs() <= 3.0 * f32::EPSILON * (linear + 0.001));
+            assert!(
+                (decode(encode(linear)) - linear).abs() <= 3.0 * f32::EPSILON * (linear + 0.001)
+            );
         }
     }
 

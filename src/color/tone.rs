@@ -78,7 +78,7 @@ fn log_exposure(linear: f32) -> f32 {
 /// y = ½ + s·d · (1 + A·|d|ᵖ)^(−1/p),     d = x − x₀,  s = 2
 /// ```
 ///
-/// with `p` = 3 below (toe) and 3.25 above (shoulder). `A` follows from the end point (e, y_e) of
+/// with `p` = 3 below (toe) and 3.25 above (shoulder). `A` follows from the end point `(e, y_e)` of
 /// each half: `A·|e − x₀|ᵖ = (s·|e − x₀| / ½)ᵖ − 1`.
 fn sigmoid(x: f32) -> f32 {
     let pivot = STOPS_BELOW / (STOPS_BELOW + STOPS_ABOVE);
@@ -109,7 +109,10 @@ mod tests {
             assert!(curve(Vec3::ZERO).max_element() < 1e-6, "{name}: {}", curve(Vec3::ZERO));
             for x in exposures().chain([f32::MAX]) {
                 let y = curve(Vec3::splat(x));
-                assert!(y.is_finite() && y.min_element() >= 0.0 && y.max_element() <= 1.0, "{name}({x}) = {y}");
+                assert!(
+                    y.is_finite() && y.min_element() >= 0.0 && y.max_element() <= 1.0,
+                    "{name}({x}) = {y}"
+                );
             }
         }
     }

@@ -15,7 +15,9 @@ const TILE: u32 = 32;
 pub enum FilmError {
     #[error("a picture of {width} × {height} pixels: both sides must be at least 1")]
     Empty { width: u32, height: u32 },
-    #[error("no memory for a film of {width} × {height} pixels; render it smaller or with fewer layers")]
+    #[error(
+        "no memory for a film of {width} × {height} pixels; render it smaller or with fewer layers"
+    )]
     Memory { width: u32, height: u32, source: TryReserveError },
 }
 
@@ -89,8 +91,11 @@ impl Film {
         }
         // Saturation cannot reach the allocator: it turns into its "capacity overflow".
         let pixels = (width as usize).saturating_mul(height as usize);
-        let sums = Sums::new(pixels, layers)
-            .map_err(|source| FilmError::Memory { width, height, source })?;
+        let sums = Sums::new(pixels, layers).map_err(|source| FilmError::Memory {
+            width,
+            height,
+            source,
+        })?;
         Ok(Self { size, layers: layers.to_vec(), sums, non_finite: 0 })
     }
 
@@ -121,7 +126,10 @@ impl Film {
     /// When the tile is not part of the film, or when there is no memory for a tile.
     pub fn tile_buffer(&self, tile: Tile) -> TileBuffer {
         assert!(
-            tile.x0 <= tile.x1 && tile.x1 <= self.size.0 && tile.y0 <= tile.y1 && tile.y1 <= self.size.1,
+            tile.x0 <= tile.x1
+                && tile.x1 <= self.size.0
+                && tile.y0 <= tile.y1
+                && tile.y1 <= self.size.1,
             "{tile:?} reaches beyond a film of {:?}",
             self.size
         );
@@ -273,8 +281,7 @@ impl Sums {
 
     /// Adds pixel `j` of `other`, which collects the same layers, to pixel `i`.
     fn join(&mut self, i: usize, other: &Self, j: usize) {
-        let spread =
-            moments::join(&mut self.mean[i], self.count[i], other.mean[j], other.count[j]);
+        let spread = moments::join(&mut self.mean[i], self.count[i], other.mean[j], other.count[j]);
         self.count[i] += other.count[j];
         if let Some(m2) = self.m2.get_mut(i) {
             *m2 += spread + other.m2[j];
@@ -429,7 +436,11 @@ mod tests {
             for part in [&ids[..cut], &ids[cut..]] {
                 let mut buffer = film.tile_buffer(whole(&film));
                 for &id in part {
-                    buffer.add(0, 0, &PixelSample { radiance: Rgb::ZERO, first_hit: Some(hit(id)) });
+                    buffer.add(
+                        0,
+                        0,
+                        &PixelSample { radiance: Rgb::ZERO, first_hit: Some(hit(id)) },
+                    );
                 }
                 film.merge(buffer);
             }

@@ -212,7 +212,8 @@ mod tests {
         let sampler = FilterSampler::new(&Filter::default());
         for i in 1..1024 {
             let u = i as f32 / 1024.0;
-            let (left, right) = (sampler.sample(Vec2::splat(u)), sampler.sample(Vec2::splat(1.0 - u)));
+            let (left, right) =
+                (sampler.sample(Vec2::splat(u)), sampler.sample(Vec2::splat(1.0 - u)));
             assert_eq!(left, -right);
         }
     }
