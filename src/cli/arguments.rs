@@ -52,22 +52,24 @@ pub enum Command {
 /// file. manifest.json beside them records times, settings and warnings.
 ///
 /// Frames that are there already, whole and rendered from the same scene with the same settings,
-/// are kept; so after an interruption (Ctrl-C) the same command goes on where it stopped.
+/// are kept. So after an interruption (Ctrl-C) the same command goes on where it stopped.
 #[derive(Debug, Args)]
-#[command(after_long_help = "\
+#[command(
+    verbatim_doc_comment,
+    after_long_help = "\
 Examples:
   kinora render scenes/ball.ron
   kinora render scenes/ball.ron --frames 0-99:10 --samples 16
   kinora render scenes/ball.ron --set render.tonemap=Agx --set entities.ball.velocity.linear=(2,0,0)
-  kinora render scenes/ball.ron --threads 2 --progress json > progress.jsonl")]
+  kinora render scenes/ball.ron --threads 2 --progress json > progress.jsonl"
+)]
 pub struct RenderArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
 
-    /// Which frames: 5, 0-47, 0-99:3 (every third), or a list such as 9,10,15-20
+    /// Which frames: 5, 0-47, 0-99:3 (every third), or 9,10,15-20 [default: the scene's]
     ///
     /// They are rendered in the order given. Frames outside the scene's own range are allowed.
-    /// [default: all frames of the scene's clock]
     #[arg(long, value_name = "LIST")]
     pub frames: Option<FrameList>,
 
@@ -94,6 +96,7 @@ pub struct RenderArguments {
 ///
 /// All mistakes that can be found in one run are shown with their place in the file.
 #[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
 pub struct CheckArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
@@ -130,7 +133,7 @@ pub struct SceneArguments {
     ///
     /// The path names fields as the scene file does; the value is written as in the file:
     /// --set entities.ball.velocity.linear=(2,0,0)
-    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
+    #[arg(long = "set", verbatim_doc_comment, value_name = "PATH=VALUE", value_parser = parse_override)]
     pub overrides: Vec<String>,
 
     /// Folder in which the scene's meshes and textures are looked for as well (repeatable)

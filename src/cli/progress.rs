@@ -142,8 +142,7 @@ fn say(text: &str) {
 
 /// One object on one line, with `event` as its first field.
 fn event(name: &str, facts: Value) {
-    let mut line = serde_json::Map::new();
-    line.insert("event".to_owned(), name.into());
+    let mut line = serde_json::Map::from_iter([("event".to_owned(), Value::from(name))]);
     if let Value::Object(fields) = facts {
         line.extend(fields);
     }

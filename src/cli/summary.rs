@@ -38,6 +38,13 @@ impl Summary {
     }
 
     pub fn for_people(&self, folder: &Path) -> String {
+        if self.rendered == 0 {
+            return format!(
+                "nothing to render: {} in {}",
+                format::plural(self.kept, "frame"),
+                folder.display()
+            );
+        }
         let seconds = self.start.elapsed();
         let frames = format::plural(self.rendered, "frame");
         let mut lines = vec![match self.kept {
@@ -48,15 +55,13 @@ impl Summary {
             format!("{name} {}", format::duration(Duration::from_secs_f64(s)))
         };
         let stages: Vec<_> = self.stages.iter().map(stage).collect();
-        if self.rendered > 0 {
-            lines.push(format!("  time     {}", stages.join(", ")));
-            lines.push(format!("  samples  {}", format::count(self.samples as f64)));
-            lines.push(format!(
-                "  rays     {} ({} rays/s)",
-                format::count(self.rays as f64),
-                format::count(self.rays as f64 / seconds.as_secs_f64().max(f64::MIN_POSITIVE))
-            ));
-        }
+        lines.push(format!("  time     {}", stages.join(", ")));
+        lines.push(format!("  samples  {}", format::count(self.samples as f64)));
+        lines.push(format!(
+            "  rays     {} ({} rays/s)",
+            format::count(self.rays as f64),
+            format::count(self.rays as f64 / seconds.as_secs_f64().max(f64::MIN_POSITIVE))
+        ));
         if let Some(bytes) = peak_memory_bytes() {
             lines.push(format!("  memory   {} at most", format::bytes(bytes)));
         }
