@@ -1,6 +1,19 @@
 //! Accumulation of radiance samples: pixel filter, sums, variance, auxiliary layers.
+//!
+//! Every worker fills the [`TileBuffer`] of its own tile; [`Film::merge`] joins it to the film. Tiles do
+//! not overlap, so that the order in which they are merged does not show. Several passes over the
+//! same tile must be merged in the order of the passes, for floating-point sums have an order.
 
-use crate::description::{Layer, Rgb};
+mod accumulate;
+mod filter;
+mod moments;
+mod planes;
+
+pub use accumulate::{Film, FilmError, TileBuffer};
+pub use filter::FilterSampler;
+pub use planes::{Plane, PlaneSamples};
+
+use crate::description::Rgb;
 use glam::{DVec3, Vec2, Vec3};
 
 /// One sample of a pixel.
@@ -38,10 +51,3 @@ pub struct Tile {
     pub x1: u32,
     pub y1: u32,
 }
-
-/// Placeholder of the contract.
-pub fn contract(_: &[Layer]) {}
-
-/// The film (contract only; the owner of this folder replaces it).
-#[derive(Debug)]
-pub struct Film;

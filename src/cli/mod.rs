@@ -1,0 +1,48 @@
+//! The command line: one file per command. It is a user of the library, no more.
+
+mod arguments;
+mod check;
+mod engine;
+mod failure;
+mod format;
+mod frames;
+mod interrupt;
+mod progress;
+mod render;
+mod summary;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use failure::INTERNAL;
+use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
+use std::process::ExitCode;
+
+/// Runs the command that was typed and answers with its exit code.
+pub fn main() -> ExitCode {
+    std::panic::set_hook(Box::new(report_panic));
+    let arguments = Arguments::parse(); // ends the program by itself on --help and on misuse (2)
+    let outcome = catch_unwind(AssertUnwindSafe(|| match arguments.command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+    }));
+    match outcome {
+        Ok(Ok(())) => ExitCode::SUCCESS,
+        Ok(Err(failure)) => {
+            failure.print();
+            ExitCode::from(failure.exit_code())
+        }
+        Err(_) => ExitCode::from(INTERNAL), // the hook has told about it
+    }
+}
+
+/// A panic is our mistake, never the user's: say so in short.
+fn report_panic(info: &PanicHookInfo<'_>) {
+    let place =
+        info.location().map_or_else(String::new, |at| format!(" ({}:{})", at.file(), at.line()));
+    let what = info.payload_as_str().unwrap_or("unknown");
+    eprintln!(
+        "internal error: {what}{place}\n\
+         This is a mistake in kinora, not in your scene. Frames which are finished are kept.\n\
+         Please report it with this message and, if you can, the scene."
+    );
+}

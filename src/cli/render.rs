@@ -1,0 +1,217 @@
+//! `kinora render`: the frames of a scene to files.
+
+use super::arguments::RenderArguments;
+use super::engine::{self, Engine};
+use super::failure::Failure;
+use super::format;
+use super::frames::FrameList;
+use super::interrupt::cancel_on_signal;
+use super::progress::Progress;
+use super::summary::Summary;
+use kinora::description::SceneDescription;
+use kinora::frame::{RenderControl, RenderedFrame};
+use kinora::output::{
+    FrameEntry, FrameFiles, FrameMetadata, JobFingerprint, Manifest, RunFacts, SOFTWARE,
+    check_writable, frame_is_complete, peak_memory_bytes, write_exr, write_png,
+};
+use rayon::prelude::*;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// What is to be rendered and where it goes.
+struct Job {
+    scene: SceneDescription,
+    scene_path: PathBuf,
+    /// All frames that were asked for.
+    frames: FrameList,
+    /// Those of them which are not on disk yet.
+    pending: Vec<u32>,
+    folder: PathBuf,
+    /// The stem of the scene file, and so of the pictures.
+    name: String,
+    fingerprint: JobFingerprint,
+    control: RenderControl,
+}
+
+pub fn run(arguments: &RenderArguments) -> Result<(), Failure> {
+    let control = RenderControl::default();
+    cancel_on_signal(&control);
+    if let Some(threads) = arguments.threads {
+        start_threads(threads)?;
+    }
+    let job = Job::new(arguments, control)?;
+    let facts = RunFacts::new(&job.scene, &arguments.scene.overrides, rayon::current_num_threads());
+    let mut manifest = Manifest::open(&job.folder, facts, &job.fingerprint);
+    manifest.save()?;
+
+    let mut summary = Summary::new(job.kept());
+    let mut progress = Progress::new(arguments.progress, &job.control, job.pending.len());
+    progress.start(&job.opening(), job.opening_facts());
+    let outcome = job.render_pending(&mut manifest, &mut progress, &mut summary);
+    match &outcome {
+        Ok(()) => progress
+            .end(&summary.for_people(&job.folder), summary.for_programs("done", &job.folder)),
+        Err(Failure::Interrupted { .. }) => {
+            progress.end("", summary.for_programs("interrupted", &job.folder));
+        }
+        Err(_) => progress.end("", summary.for_programs("failed", &job.folder)),
+    }
+    outcome
+}
+
+fn start_threads(threads: u32) -> Result<(), Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads as usize)
+        .build_global()
+        .map_err(|error| Failure::Usage(format!("cannot start {threads} threads: {error}")))
+}
+
+impl Job {
+    fn new(arguments: &RenderArguments, control: RenderControl) -> Result<Self, Failure> {
+        let scene = engine::load(&arguments.scene)?;
+        let scene_path = arguments.scene.path.clone();
+        let stem = scene_path.file_stem().unwrap_or(scene_path.as_os_str());
+        let name = stem.to_string_lossy().into_owned();
+        let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(stem));
+        check_writable(&folder)?;
+
+        let frames = match &arguments.frames {
+            Some(list) => list.clone(),
+            None => FrameList::from_range(scene.clock.frames.0, scene.clock.frames.1).map_err(
+                |error| Failure::Usage(format!("the scene's clock: {error}; use --frames")),
+            )?,
+        };
+        let fingerprint = JobFingerprint::new(&scene, &arguments.scene.overrides);
+        let is_pending = |&frame: &u32| {
+            arguments.fresh
+                || !frame_is_complete(&folder, &name, frame, fingerprint.of_frame(frame))
+        };
+        let pending = frames.frames().par_iter().copied().filter(is_pending).collect();
+        Ok(Self { scene, scene_path, frames, pending, folder, name, fingerprint, control })
+    }
+
+    /// How many frames were found finished.
+    fn kept(&self) -> usize {
+        self.frames.frames().len() - self.pending.len()
+    }
+
+    fn opening(&self) -> String {
+        let render = &self.scene.render;
+        let (total, kept) = (self.frames.frames().len(), self.kept());
+        let scene = self.scene_path.display();
+        let mut text = format!(
+            "{SOFTWARE}: {scene}, {} of {} × {} pixels, {} per pixel, {}",
+            format::plural(total, "frame"),
+            render.size.0,
+            render.size.1,
+            format::plural(render.samples as usize, "sample"),
+            format::plural(rayon::current_num_threads(), "thread"),
+        );
+        if kept > 0 {
+            let which = if kept == total { "all".to_owned() } else { format!("{kept} of {total}") };
+            text +=
+                &format!("\n{which} are there already and are kept (--fresh renders them again)");
+        }
+        text
+    }
+
+    fn opening_facts(&self) -> serde_json::Value {
+        let render = &self.scene.render;
+        json!({
+            "software": SOFTWARE, "scene": self.scene_path, "out": self.folder,
+            "frames": self.frames.frames().len(), "kept": self.kept(),
+            "width": render.size.0, "height": render.size.1, "samples_per_pixel": render.samples,
+            "threads": rayon::current_num_threads(),
+        })
+    }
+
+    fn render_pending(
+        &self,
+        manifest: &mut Manifest,
+        progress: &mut Progress,
+        summary: &mut Summary,
+    ) -> Result<(), Failure> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        let mut engine = Engine::new(&self.scene)?;
+        for &frame in &self.pending {
+            self.control.samples_done.store(0, Ordering::Relaxed);
+            self.control.rays.store(0, Ordering::Relaxed);
+            progress.frame_started(frame);
+            let start = Instant::now();
+            let rendered = match self.control.cancel.load(Ordering::SeqCst) {
+                true => None,
+                false => engine.render_frame(frame, &self.control)?,
+            };
+            let Some(rendered) = rendered else {
+                return Err(Failure::Interrupted {
+                    finished: summary.kept + summary.rendered,
+                    total: self.frames.frames().len(),
+                    folder: self.folder.clone(),
+                });
+            };
+            let entry = self.write(frame, rendered, start)?;
+            manifest.record(&entry)?;
+            summary.add(&entry);
+            for warning in warnings(&entry) {
+                progress.warn(&warning);
+            }
+            progress.frame_done(&entry);
+        }
+        Ok(())
+    }
+
+    /// Puts a frame on disk, and tells how long it took since `start`.
+    fn write(
+        &self,
+        frame: u32,
+        rendered: RenderedFrame,
+        start: Instant,
+    ) -> Result<FrameEntry, Failure> {
+        let RenderedFrame { film, report, world_to_camera } = rendered;
+        let files = FrameFiles::new(&self.folder, &self.name, frame);
+        let settings = &self.scene.render;
+        let fingerprint = self.fingerprint.of_frame(frame);
+        let metadata = FrameMetadata::new(
+            fingerprint,
+            frame,
+            &self.scene,
+            &report.integrator,
+            world_to_camera,
+        );
+        write_png(&files.png, &film, settings)?;
+        let saturated = write_exr(&files.exr, &film, settings, &metadata)?;
+        Ok(FrameEntry {
+            frame,
+            fingerprint,
+            files: FrameEntry::file_names(&files),
+            wall_seconds: start.elapsed().as_secs_f64(),
+            peak_memory_bytes: peak_memory_bytes(),
+            saturated,
+            report,
+        })
+    }
+}
+
+/// What the user should know of a frame.
+fn warnings(entry: &FrameEntry) -> Vec<String> {
+    let mut warnings = entry.report.warnings.clone();
+    let frame = entry.frame;
+    if entry.report.non_finite > 0 {
+        warnings.push(format!(
+            "frame {frame}: {} samples were not finite and were dropped",
+            entry.report.non_finite
+        ));
+    }
+    if entry.saturated > 0 {
+        warnings.push(format!(
+            "frame {frame}: {} numbers are too large for 16 bits and were written as 65504; \
+             exr_bits: 32 keeps them",
+            entry.saturated
+        ));
+    }
+    warnings
+}

@@ -1,0 +1,82 @@
+//! What a run came to, told at its end.
+
+use super::format;
+use kinora::output::{FrameEntry, MANIFEST_NAME, peak_memory_bytes};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Sums over the frames of a run.
+pub struct Summary {
+    start: Instant,
+    /// Seconds by stage, in the order of the stages.
+    stages: Vec<(&'static str, f64)>,
+    samples: u64,
+    rays: u64,
+    /// Frames rendered by this run, and frames found finished.
+    pub rendered: usize,
+    pub kept: usize,
+}
+
+impl Summary {
+    pub fn new(kept: usize) -> Self {
+        Self { start: Instant::now(), stages: Vec::new(), samples: 0, rays: 0, rendered: 0, kept }
+    }
+
+    pub fn add(&mut self, entry: &FrameEntry) {
+        self.rendered += 1;
+        self.samples += entry.report.samples;
+        self.rays += entry.report.rays;
+        let in_stages: f64 = entry.report.stage_seconds.iter().map(|(_, seconds)| seconds).sum();
+        let files = ("develop and write", (entry.wall_seconds - in_stages).max(0.0));
+        for &(stage, seconds) in entry.report.stage_seconds.iter().chain([&files]) {
+            match self.stages.iter_mut().find(|(name, _)| *name == stage) {
+                Some((_, sum)) => *sum += seconds,
+                None => self.stages.push((stage, seconds)),
+            }
+        }
+    }
+
+    pub fn for_people(&self, folder: &Path) -> String {
+        if self.rendered == 0 {
+            return format!(
+                "nothing to render: {} in {}",
+                format::plural(self.kept, "frame"),
+                folder.display()
+            );
+        }
+        let seconds = self.start.elapsed();
+        let frames = format::plural(self.rendered, "frame");
+        let mut lines = vec![match self.kept {
+            0 => format!("{frames} rendered in {}", format::duration(seconds)),
+            kept => format!("{frames} rendered in {}, {kept} kept", format::duration(seconds)),
+        }];
+        let stage = |&(name, s): &(&str, f64)| {
+            format!("{name} {}", format::duration(Duration::from_secs_f64(s)))
+        };
+        let stages: Vec<_> = self.stages.iter().map(stage).collect();
+        lines.push(format!("  time     {}", stages.join(", ")));
+        lines.push(format!("  samples  {}", format::count(self.samples as f64)));
+        lines.push(format!(
+            "  rays     {} ({} rays/s)",
+            format::count(self.rays as f64),
+            format::count(self.rays as f64 / seconds.as_secs_f64().max(f64::MIN_POSITIVE))
+        ));
+        if let Some(bytes) = peak_memory_bytes() {
+            lines.push(format!("  memory   {} at most", format::bytes(bytes)));
+        }
+        lines.push(format!("  files    {} (record: {MANIFEST_NAME})", folder.display()));
+        lines.join("\n")
+    }
+
+    pub fn for_programs(&self, outcome: &str, folder: &Path) -> Value {
+        let stages: serde_json::Map<_, _> =
+            self.stages.iter().map(|&(name, seconds)| (name.to_owned(), seconds.into())).collect();
+        json!({
+            "outcome": outcome, "rendered": self.rendered, "kept": self.kept,
+            "seconds": self.start.elapsed().as_secs_f64(), "stage_seconds": stages,
+            "samples": self.samples, "rays": self.rays,
+            "peak_memory_bytes": peak_memory_bytes(), "out": folder,
+        })
+    }
+}

@@ -1,0 +1,466 @@
+//! The film and the tiles that are merged into it.
+
+use super::{FirstHit, PixelSample, Tile, moments};
+use crate::description::{Layer, Rgb};
+use glam::{DVec2, DVec3};
+use std::collections::TryReserveError;
+
+/// Side of a tile in pixels: small enough to balance the load, large enough that its buffer (some
+/// 100 kB with every layer) is filled from the cache.
+const TILE: u32 = 32;
+
+/// Why a film cannot be made.
+#[expect(missing_docs, reason = "each message names its fields")]
+#[derive(Debug, thiserror::Error)]
+pub enum FilmError {
+    #[error("a picture of {width} × {height} pixels: both sides must be at least 1")]
+    Empty { width: u32, height: u32 },
+    #[error(
+        "no memory for a film of {width} × {height} pixels; render it smaller or with fewer layers"
+    )]
+    Memory { width: u32, height: u32, source: TryReserveError },
+}
+
+/// Sums over all samples of all pixels, row by row from the top left.
+#[derive(Clone, Debug)]
+pub struct Film {
+    pub(super) size: (u32, u32),
+    pub(super) layers: Vec<Layer>,
+    pub(super) sums: Sums,
+    non_finite: u64,
+}
+
+/// The samples of one tile, on their way to the film.
+#[derive(Debug)]
+pub struct TileBuffer {
+    tile: Tile,
+    sums: Sums,
+    non_finite: u64,
+}
+
+/// Sums over a rectangle of pixels. A vector which no layer asked for is empty.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sums {
+    /// Samples per pixel, dropped ones not included.
+    pub count: Vec<u32>,
+    /// Mean radiance.
+    pub mean: Vec<DVec3>,
+    /// Sum of squared deviations from the mean.
+    pub m2: Vec<DVec3>,
+    /// Samples whose ray met a surface.
+    pub hits: Vec<u32>,
+    pub albedo: Vec<DVec3>,
+    pub normal: Vec<DVec3>,
+    pub depth: Vec<f64>,
+    pub position: Vec<DVec3>,
+    pub motion: Vec<DVec2>,
+    pub object: Vec<Vote>,
+}
+
+/// A vote which a majority always wins: the id that leads and by how much.
+///
+/// Boyer and Moore 1991, "MJRTY — A Fast Majority Vote Algorithm". Where no id has more than half
+/// of the hits, one of those seen is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Vote {
+    pub id: u32,
+    lead: u32,
+}
+
+impl Vote {
+    fn cast(&mut self, other: Self) {
+        if self.id == other.id {
+            self.lead += other.lead;
+        } else if other.lead > self.lead {
+            *self = Self { id: other.id, lead: other.lead - self.lead };
+        } else {
+            self.lead -= other.lead;
+        }
+    }
+}
+
+impl Film {
+    /// An empty film of `size` pixels (width, height) which collects what `layers` need.
+    ///
+    /// # Errors
+    /// When a side is 0 or the memory cannot be had.
+    pub fn new(size: (u32, u32), layers: &[Layer]) -> Result<Self, FilmError> {
+        let (width, height) = size;
+        if width == 0 || height == 0 {
+            return Err(FilmError::Empty { width, height });
+        }
+        // Saturation cannot reach the allocator: it turns into its "capacity overflow".
+        let pixels = (width as usize).saturating_mul(height as usize);
+        let sums = Sums::new(pixels, layers).map_err(|source| FilmError::Memory {
+            width,
+            height,
+            source,
+        })?;
+        Ok(Self { size, layers: layers.to_vec(), sums, non_finite: 0 })
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Whether any layer needs [`PixelSample::first_hit`].
+    pub fn wants_first_hit(&self) -> bool {
+        !self.sums.hits.is_empty()
+    }
+
+    /// The film cut into tiles, row by row; together they cover every pixel once.
+    pub fn tiles(&self) -> Vec<Tile> {
+        let (width, height) = self.size;
+        let starts = |length: u32| (0..length).step_by(TILE as usize);
+        let end = |start: u32, length: u32| start.saturating_add(TILE).min(length);
+        starts(height)
+            .flat_map(|y0| starts(width).map(move |x0| (x0, y0)))
+            .map(|(x0, y0)| Tile { x0, y0, x1: end(x0, width), y1: end(y0, height) })
+            .collect()
+    }
+
+    /// An empty buffer for a tile of this film.
+    ///
+    /// # Panics
+    /// When the tile is not part of the film, or when there is no memory for a tile.
+    pub fn tile_buffer(&self, tile: Tile) -> TileBuffer {
+        assert!(
+            tile.x0 <= tile.x1
+                && tile.x1 <= self.size.0
+                && tile.y0 <= tile.y1
+                && tile.y1 <= self.size.1,
+            "{tile:?} reaches beyond a film of {:?}",
+            self.size
+        );
+        let pixels = (tile.x1 - tile.x0) as usize * (tile.y1 - tile.y0) as usize;
+        let sums = Sums::new(pixels, &self.layers).expect("memory for one tile");
+        TileBuffer { tile, sums, non_finite: 0 }
+    }
+
+    /// Adds the samples of a tile.
+    pub fn merge(&mut self, buffer: TileBuffer) {
+        let tile = buffer.tile;
+        let tile_width = (tile.x1 - tile.x0) as usize;
+        for y in tile.y0..tile.y1 {
+            let from = (y - tile.y0) as usize * tile_width;
+            let to = y as usize * self.size.0 as usize + tile.x0 as usize;
+            for column in 0..tile_width {
+                self.sums.join(to + column, &buffer.sums, from + column);
+            }
+        }
+        self.non_finite += buffer.non_finite;
+    }
+
+    /// Samples that were dropped because they held a NaN, an infinity or negative radiance.
+    pub fn non_finite(&self) -> u64 {
+        self.non_finite
+    }
+
+    /// Mean radiance of a pixel, W·m⁻²·sr⁻¹ per channel; 0 without samples.
+    ///
+    /// # Panics
+    /// When the pixel lies outside.
+    pub fn radiance(&self, x: u32, y: u32) -> Rgb {
+        self.sums.mean[self.index(x, y)].as_vec3()
+    }
+
+    /// Samples of a pixel, dropped ones not included.
+    ///
+    /// # Panics
+    /// When the pixel lies outside.
+    pub fn samples(&self, x: u32, y: u32) -> u32 {
+        self.sums.count[self.index(x, y)]
+    }
+
+    fn index(&self, x: u32, y: u32) -> usize {
+        assert!(x < self.size.0 && y < self.size.1, "pixel ({x}, {y}) outside {:?}", self.size);
+        y as usize * self.size.0 as usize + x as usize
+    }
+}
+
+impl TileBuffer {
+    /// The rectangle of the film which this buffer collects.
+    pub fn tile(&self) -> Tile {
+        self.tile
+    }
+
+    /// Adds a sample to the pixel in column `x` and row `y` of the **film**.
+    ///
+    /// A sample with a NaN, an infinity or negative radiance is dropped and counted, never averaged; a
+    /// first hit with a NaN or an infinity is dropped alone, and counted as well.
+    ///
+    /// # Panics
+    /// When the pixel lies outside the tile.
+    pub fn add(&mut self, x: u32, y: u32, sample: &PixelSample) {
+        let tile = self.tile;
+        assert!(
+            (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y),
+            "pixel ({x}, {y}) outside {tile:?}"
+        );
+        let index = (y - tile.y0) as usize * (tile.x1 - tile.x0) as usize + (x - tile.x0) as usize;
+        if !sample.radiance.is_finite() || sample.radiance.min_element() < 0.0 {
+            self.non_finite += 1;
+            return;
+        }
+        self.sums.push(index, sample.radiance);
+        if !self.sums.hits.is_empty()
+            && let Some(hit) = &sample.first_hit
+        {
+            if is_finite(hit) {
+                self.sums.push_hit(index, hit);
+            } else {
+                self.non_finite += 1;
+            }
+        }
+    }
+}
+
+fn is_finite(hit: &FirstHit) -> bool {
+    hit.albedo.is_finite()
+        && hit.normal.is_finite()
+        && hit.depth.is_finite()
+        && hit.position.is_finite()
+        && hit.motion.is_finite()
+}
+
+/// `count` copies of the default, or none where they are not wanted.
+fn filled<T: Clone + Default>(wanted: bool, count: usize) -> Result<Vec<T>, TryReserveError> {
+    let mut values = Vec::new();
+    if wanted {
+        values.try_reserve_exact(count)?;
+        values.resize(count, T::default());
+    }
+    Ok(values)
+}
+
+impl Sums {
+    fn new(pixels: usize, layers: &[Layer]) -> Result<Self, TryReserveError> {
+        let wants = |layer| layers.contains(&layer);
+        let of_first_hit = [
+            Layer::Albedo,
+            Layer::Normal,
+            Layer::Depth,
+            Layer::Position,
+            Layer::Motion,
+            Layer::ObjectId,
+        ];
+        Ok(Self {
+            count: filled(true, pixels)?,
+            mean: filled(true, pixels)?,
+            m2: filled(wants(Layer::Variance), pixels)?,
+            hits: filled(of_first_hit.into_iter().any(wants), pixels)?,
+            albedo: filled(wants(Layer::Albedo), pixels)?,
+            normal: filled(wants(Layer::Normal), pixels)?,
+            depth: filled(wants(Layer::Depth), pixels)?,
+            position: filled(wants(Layer::Position), pixels)?,
+            motion: filled(wants(Layer::Motion), pixels)?,
+            object: filled(wants(Layer::ObjectId), pixels)?,
+        })
+    }
+
+    fn push(&mut self, i: usize, radiance: Rgb) {
+        self.count[i] += 1;
+        let spread = moments::push(&mut self.mean[i], self.count[i], radiance.as_dvec3());
+        if let Some(m2) = self.m2.get_mut(i) {
+            *m2 += spread;
+        }
+    }
+
+    fn push_hit(&mut self, i: usize, hit: &FirstHit) {
+        self.hits[i] += 1;
+        add(&mut self.albedo, i, hit.albedo.as_dvec3());
+        add(&mut self.normal, i, hit.normal.as_dvec3());
+        add(&mut self.depth, i, f64::from(hit.depth));
+        add(&mut self.position, i, hit.position);
+        add(&mut self.motion, i, hit.motion.as_dvec2());
+        if let Some(vote) = self.object.get_mut(i) {
+            vote.cast(Vote { id: hit.object_id, lead: 1 });
+        }
+    }
+
+    /// Adds pixel `j` of `other`, which collects the same layers, to pixel `i`.
+    fn join(&mut self, i: usize, other: &Self, j: usize) {
+        let spread = moments::join(&mut self.mean[i], self.count[i], other.mean[j], other.count[j]);
+        self.count[i] += other.count[j];
+        if let Some(m2) = self.m2.get_mut(i) {
+            *m2 += spread + other.m2[j];
+        }
+        join(&mut self.hits, i, &other.hits, j);
+        join(&mut self.albedo, i, &other.albedo, j);
+        join(&mut self.normal, i, &other.normal, j);
+        join(&mut self.depth, i, &other.depth, j);
+        join(&mut self.position, i, &other.position, j);
+        join(&mut self.motion, i, &other.motion, j);
+        if let Some(vote) = self.object.get_mut(i) {
+            vote.cast(other.object[j]);
+        }
+    }
+}
+
+fn add<T: std::ops::AddAssign>(sums: &mut [T], i: usize, value: T) {
+    if let Some(sum) = sums.get_mut(i) {
+        *sum += value;
+    }
+}
+
+fn join<T: std::ops::AddAssign + Copy>(sums: &mut [T], i: usize, others: &[T], j: usize) {
+    if let Some(sum) = sums.get_mut(i) {
+        *sum += others[j];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Vec2, Vec3};
+
+    fn gray(value: f32) -> PixelSample {
+        PixelSample { radiance: Rgb::splat(value), first_hit: None }
+    }
+
+    fn whole(film: &Film) -> Tile {
+        Tile { x0: 0, y0: 0, x1: film.size.0, y1: film.size.1 }
+    }
+
+    fn hit(object_id: u32) -> FirstHit {
+        FirstHit {
+            albedo: Rgb::splat(0.5),
+            normal: Vec3::Z,
+            depth: 2.0,
+            position: DVec3::new(1.0, 2.0, 3.0),
+            motion: Vec2::new(4.0, -1.0),
+            object_id,
+        }
+    }
+
+    /// A plain f32 sum of 0.1 is 1 % off after 10⁶ terms already.
+    #[test]
+    fn ten_million_samples_of_a_constant_average_to_it() {
+        let mut film = Film::new((1, 1), &[Layer::Variance]).expect("small");
+        let mut buffer = film.tile_buffer(whole(&film));
+        for _ in 0..10_000_000 {
+            buffer.add(0, 0, &gray(0.1));
+        }
+        film.merge(buffer);
+        assert!((film.sums.mean[0].x - 0.1).abs() < 1e-6);
+        assert_eq!(film.samples(0, 0), 10_000_000);
+        assert!(film.sums.m2[0].x < 1e-12);
+    }
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        for size in [(1, 1), (32, 32), (33, 31), (640, 7), (5, 97)] {
+            let film = Film::new(size, &[]).expect("small");
+            let mut seen = vec![0; (size.0 * size.1) as usize];
+            for tile in film.tiles() {
+                for y in tile.y0..tile.y1 {
+                    for x in tile.x0..tile.x1 {
+                        seen[(y * size.0 + x) as usize] += 1;
+                    }
+                }
+            }
+            assert!(seen.iter().all(|&count| count == 1), "{size:?}");
+        }
+    }
+
+    /// Tiles in any order give the bits of one buffer over the whole film.
+    #[test]
+    fn merged_tiles_equal_a_single_accumulation_to_the_bit() {
+        let layers = [Layer::Variance, Layer::ObjectId, Layer::Position];
+        let empty = Film::new((70, 50), &layers).expect("small");
+        let sample = |x: u32, y: u32, s: u32| PixelSample {
+            radiance: Rgb::new(x as f32 * 0.1, y as f32 * 0.37, s as f32 / 3.0),
+            first_hit: (s % 3 != 0).then(|| hit(x + 1)),
+        };
+        let fill = |tile: Tile| {
+            let mut buffer = empty.tile_buffer(tile);
+            for y in tile.y0..tile.y1 {
+                for x in tile.x0..tile.x1 {
+                    (0..5).for_each(|s| buffer.add(x, y, &sample(x, y, s)));
+                }
+            }
+            buffer
+        };
+        let mut single = empty.clone();
+        single.merge(fill(whole(&empty)));
+        let mut backwards = empty.clone();
+        empty.tiles().into_iter().rev().for_each(|tile| backwards.merge(fill(tile)));
+        assert_eq!(single.sums.mean, backwards.sums.mean);
+        assert_eq!(single.sums.m2, backwards.sums.m2);
+        assert_eq!(single.sums.position, backwards.sums.position);
+        assert_eq!(single.sums.object, backwards.sums.object);
+    }
+
+    #[test]
+    fn two_passes_equal_one_pass_of_all_samples_but_for_rounding() {
+        let value = |s: u32| (s as f32 * 0.7).sin() + 1.0;
+        let mut one = Film::new((1, 1), &[Layer::Variance]).expect("small");
+        let mut two = one.clone();
+        for passes in [&mut [0..100][..], &mut [0..37, 37..100]] {
+            let film = if passes.len() == 1 { &mut one } else { &mut two };
+            for pass in passes {
+                let mut buffer = film.tile_buffer(whole(film));
+                pass.for_each(|s| buffer.add(0, 0, &gray(value(s))));
+                film.merge(buffer);
+            }
+        }
+        assert!((one.sums.mean[0] - two.sums.mean[0]).length() < 1e-14);
+        assert!((one.sums.m2[0] - two.sums.m2[0]).length() < 1e-12);
+    }
+
+    #[test]
+    fn broken_samples_are_dropped_and_counted() {
+        let mut film = Film::new((2, 1), &[Layer::Depth]).expect("small");
+        let mut buffer = film.tile_buffer(whole(&film));
+        buffer.add(1, 0, &gray(3.0));
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0] {
+            let radiance = Rgb::new(1.0, bad, 1.0);
+            buffer.add(1, 0, &PixelSample { radiance, first_hit: Some(hit(1)) });
+        }
+        let broken_hit = FirstHit { depth: f32::NAN, ..hit(1) };
+        buffer.add(0, 0, &PixelSample { radiance: Rgb::ONE, first_hit: Some(broken_hit) });
+        film.merge(buffer);
+        assert_eq!(film.radiance(1, 0), Rgb::splat(3.0));
+        assert_eq!(film.radiance(0, 0), Rgb::ONE);
+        assert_eq!((film.samples(0, 0), film.samples(1, 0)), (1, 1));
+        assert_eq!(film.sums.hits, [0, 0]);
+        assert_eq!(film.non_finite(), 5);
+    }
+
+    #[test]
+    fn the_object_with_most_hits_names_the_pixel() {
+        let ids = [3, 7, 7, 1, 7, 3, 7, 7];
+        for cut in 0..=ids.len() {
+            let mut film = Film::new((1, 1), &[Layer::ObjectId]).expect("small");
+            for part in [&ids[..cut], &ids[cut..]] {
+                let mut buffer = film.tile_buffer(whole(&film));
+                for &id in part {
+                    buffer.add(
+                        0,
+                        0,
+                        &PixelSample { radiance: Rgb::ZERO, first_hit: Some(hit(id)) },
+                    );
+                }
+                film.merge(buffer);
+            }
+            assert_eq!(film.sums.object[0].id, 7, "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn memory_is_taken_only_for_the_layers_asked_for() {
+        let film = Film::new((8, 8), &[Layer::Beauty]).expect("small");
+        assert!(!film.wants_first_hit());
+        assert!(film.sums.m2.is_empty() && film.sums.albedo.is_empty());
+        let film = Film::new((8, 8), &[Layer::Beauty, Layer::Albedo]).expect("small");
+        assert!(film.wants_first_hit());
+        assert!(film.sums.normal.is_empty());
+    }
+
+    #[test]
+    fn impossible_sizes_are_errors() {
+        assert!(matches!(Film::new((0, 4), &[]), Err(FilmError::Empty { .. })));
+        assert!(matches!(Film::new((u32::MAX, u32::MAX), &[]), Err(FilmError::Memory { .. })));
+    }
+}

@@ -1,0 +1,186 @@
+//! From sums to pictures: one plane of numbers per channel of a layer.
+
+use super::Film;
+use crate::description::Layer;
+use glam::DVec3;
+
+/// One channel of a layer: its name and a number per pixel, row by row from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    /// As in an EXR file: `R`, `G`, `B`, `X`, `Y`, `Z`, `id`, `samples`.
+    pub name: &'static str,
+    /// The numbers.
+    pub samples: PlaneSamples,
+}
+
+/// The numbers of a plane.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PlaneSamples {
+    /// Quantities.
+    F32(Vec<f32>),
+    /// Counts and ids.
+    U32(Vec<u32>),
+}
+
+impl Film {
+    /// Develops a layer into linear planes, or `None` where the film does not collect it.
+    ///
+    /// * `Beauty`: mean radiance. `Samples`: how many it is the mean of.
+    /// * `Albedo`, `Normal`, `Position`, `Motion`, `Depth`: mean over the samples that met a surface;
+    ///   normals are not made unit again, so that their length tells how much they agree. Without
+    ///   a hit they are 0, and the depth is +∞.
+    /// * `ObjectId`: the object which most samples met, 0 without a hit.
+    /// * `Variance`: of the pixel's mean, `M₂ / (n (n − 1))`, +∞ where fewer than 2 samples say nothing
+    ///   about it.
+    ///
+    /// What exceeds the range of f32 becomes its largest number.
+    pub fn image(&self, layer: Layer) -> Option<Vec<Plane>> {
+        if !matches!(layer, Layer::Beauty | Layer::Samples) && !self.layers.contains(&layer) {
+            return None;
+        }
+        let sums = &self.sums;
+        Some(match layer {
+            Layer::Beauty => colors(["R", "G", "B"], &sums.mean),
+            Layer::Albedo => colors(["R", "G", "B"], &self.mean_over_hits(&sums.albedo)),
+            Layer::Normal => colors(["X", "Y", "Z"], &self.mean_over_hits(&sums.normal)),
+            Layer::Position => colors(["X", "Y", "Z"], &self.mean_over_hits(&sums.position)),
+            Layer::Motion => {
+                let motion: Vec<_> = sums.motion.iter().map(|m| m.extend(0.0)).collect();
+                let mut planes = colors(["X", "Y", "Z"], &self.mean_over_hits(&motion));
+                planes.truncate(2);
+                planes
+            }
+            Layer::Depth => vec![Plane { name: "Z", samples: PlaneSamples::F32(self.depth()) }],
+            Layer::ObjectId => {
+                let ids = sums.object.iter().map(|vote| vote.id).collect();
+                vec![Plane { name: "id", samples: PlaneSamples::U32(ids) }]
+            }
+            Layer::Samples => {
+                vec![Plane { name: "samples", samples: PlaneSamples::U32(sums.count.clone()) }]
+            }
+            Layer::Variance => colors(["R", "G", "B"], &self.variance_of_mean()),
+        })
+    }
+
+    fn mean_over_hits(&self, sums: &[DVec3]) -> Vec<DVec3> {
+        // A sum without hits is 0, and stays 0.
+        sums.iter().zip(&self.sums.hits).map(|(&sum, &n)| sum / f64::from(n.max(1))).collect()
+    }
+
+    fn depth(&self) -> Vec<f32> {
+        let mean = |(&sum, &hits): (&f64, &u32)| {
+            if hits == 0 { f32::INFINITY } else { (sum / f64::from(hits)) as f32 }
+        };
+        self.sums.depth.iter().zip(&self.sums.hits).map(mean).collect()
+    }
+
+    fn variance_of_mean(&self) -> Vec<DVec3> {
+        let of_pixel = |(&m2, &n): (&DVec3, &u32)| match n {
+            0 | 1 => DVec3::INFINITY,
+            _ => m2 / (f64::from(n) * f64::from(n - 1)),
+        };
+        self.sums.m2.iter().zip(&self.sums.count).map(of_pixel).collect()
+    }
+}
+
+/// Splits colours or vectors into planes.
+fn colors(names: [&'static str; 3], values: &[DVec3]) -> Vec<Plane> {
+    let plane = |axis: usize| values.iter().map(|value| to_f32(value[axis])).collect();
+    names
+        .into_iter()
+        .enumerate()
+        .map(|(axis, name)| Plane { name, samples: PlaneSamples::F32(plane(axis)) })
+        .collect()
+}
+
+/// Rounds to f32; what is finite stays finite.
+fn to_f32(value: f64) -> f32 {
+    if value.is_infinite() {
+        return value as f32;
+    }
+    value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::Rgb;
+    use crate::film::{FirstHit, PixelSample, Tile};
+    use glam::{Vec2, Vec3};
+
+    const ALL: [Layer; 9] = [
+        Layer::Beauty,
+        Layer::Albedo,
+        Layer::Normal,
+        Layer::Depth,
+        Layer::Position,
+        Layer::Motion,
+        Layer::ObjectId,
+        Layer::Samples,
+        Layer::Variance,
+    ];
+
+    /// Two pixels: the left one is met by two samples of three, the right one by none.
+    fn film() -> Film {
+        let mut film = Film::new((2, 1), &ALL).expect("small");
+        let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: 2, y1: 1 });
+        let hit = |depth: f32| FirstHit {
+            albedo: Rgb::new(depth, 0.0, 0.0),
+            normal: Vec3::Y,
+            depth,
+            position: glam::DVec3::new(0.0, f64::from(depth), 0.0),
+            motion: Vec2::new(1.0, -depth),
+            object_id: 9,
+        };
+        for first_hit in [Some(hit(1.0)), None, Some(hit(2.0))] {
+            let radiance = Rgb::splat(first_hit.map_or(0.0, |h| h.depth));
+            buffer.add(0, 0, &PixelSample { radiance, first_hit });
+        }
+        buffer.add(1, 0, &PixelSample { radiance: Rgb::ONE, first_hit: None });
+        film.merge(buffer);
+        film
+    }
+
+    fn f32s(film: &Film, layer: Layer, channel: usize) -> Vec<f32> {
+        match &film.image(layer).expect("collected")[channel].samples {
+            PlaneSamples::F32(values) => values.clone(),
+            PlaneSamples::U32(_) => panic!("{layer:?} holds integers"),
+        }
+    }
+
+    /// Worked by hand: radiances 1, 0, 2 have the mean 1 and M₂ = 2, so the mean's variance is 2/6.
+    #[test]
+    fn every_layer_has_the_value_worked_by_hand() {
+        let film = film();
+        assert_eq!(f32s(&film, Layer::Beauty, 0), [1.0, 1.0]);
+        assert_eq!(f32s(&film, Layer::Variance, 2), [1.0 / 3.0, f32::INFINITY]);
+        assert_eq!(f32s(&film, Layer::Depth, 0), [1.5, f32::INFINITY]);
+        assert_eq!(f32s(&film, Layer::Albedo, 0), [1.5, 0.0]);
+        assert_eq!(f32s(&film, Layer::Normal, 1), [1.0, 0.0]);
+        assert_eq!(f32s(&film, Layer::Position, 1), [1.5, 0.0]);
+        assert_eq!(f32s(&film, Layer::Motion, 1), [-1.5, 0.0]);
+        assert_eq!(film.image(Layer::Motion).expect("collected").len(), 2);
+        let integers = |layer| film.image(layer).expect("collected")[0].samples.clone();
+        assert_eq!(integers(Layer::ObjectId), PlaneSamples::U32(vec![9, 0]));
+        assert_eq!(integers(Layer::Samples), PlaneSamples::U32(vec![3, 1]));
+    }
+
+    #[test]
+    fn a_layer_that_was_not_asked_for_is_none() {
+        let film = Film::new((1, 1), &[Layer::Beauty]).expect("small");
+        assert!(film.image(Layer::Depth).is_none());
+        assert!(film.image(Layer::Samples).is_some());
+    }
+
+    #[test]
+    fn the_brightest_radiance_stays_finite() {
+        let mut film = Film::new((1, 1), &[Layer::Variance]).expect("small");
+        let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: 1, y1: 1 });
+        for value in [f32::MAX, f32::MAX, 0.0] {
+            buffer.add(0, 0, &PixelSample { radiance: Rgb::splat(value), first_hit: None });
+        }
+        film.merge(buffer);
+        assert!(f32s(&film, Layer::Beauty, 0)[0].is_finite());
+        assert_eq!(f32s(&film, Layer::Variance, 0)[0], f32::MAX);
+    }
+}

@@ -1,0 +1,311 @@
+//! EXR files: one part per layer, and the facts of the run in every header.
+//!
+//! The custom facts are **one** text attribute `kinora` holding a JSON object. The encoder keeps custom
+//! attributes in a hash map with a random order; with a single entry equal frames are equal files,
+//! byte for byte. Standard attributes carry what they can: `software`, `worldToCamera`,
+//! `framesPerSecond`, `chromaticities`.
+
+use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
+use crate::color::CHROMATICITIES;
+use crate::description::{Layer, RenderSettings};
+use crate::film::{Film, Plane, PlaneSamples};
+use exr::error::Error as ExrError;
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
+use exr::meta::header::{ImageAttributes, LayerAttributes};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layers, Vec2,
+    WritableImage, f16,
+};
+use glam::DMat4;
+use serde::{Deserialize, Serialize};
+use std::io::Cursor;
+use std::path::Path;
+
+/// The name of the attribute with our facts.
+const ATTRIBUTE: &str = "kinora";
+
+/// What a file tells about its frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameMetadata {
+    /// Of everything that decides the pixels.
+    pub fingerprint: Fingerprint,
+    /// The frame.
+    pub frame: u32,
+    /// When its shutter opens, in seconds.
+    pub time: f64,
+    /// Frames per second.
+    pub fps: f64,
+    /// When the shutter opens and closes, in fractions of a frame after the frame's time.
+    pub shutter: (f64, f64),
+    /// Seed of every random decision, as text: JSON readers round large integers.
+    pub seed: String,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// The camera entity.
+    pub camera: String,
+    /// The integrator that ran.
+    pub integrator: String,
+    /// Name and version of the software.
+    pub software: String,
+    /// Units of the layers.
+    pub units: String,
+    /// World to camera at shutter opening, column-major. The camera looks along its −z, +y is up.
+    pub world_to_camera: [f64; 16],
+}
+
+impl FrameMetadata {
+    /// What [`FrameMetadata::units`] says.
+    pub const UNITS: &str = "radiance W/(m^2 sr); depth, position m; motion px; \
+        linear BT.709 primaries, D65";
+
+    /// Gathers the facts of a frame.
+    pub fn new(
+        fingerprint: Fingerprint,
+        frame: u32,
+        scene: &crate::description::SceneDescription,
+        integrator: &str,
+        world_to_camera: DMat4,
+    ) -> Self {
+        let clock = scene.clock;
+        Self {
+            fingerprint,
+            frame,
+            time: (f64::from(frame) + clock.shutter.0) / clock.fps,
+            fps: clock.fps,
+            shutter: clock.shutter,
+            seed: scene.render.seed.to_string(),
+            samples: scene.render.samples,
+            camera: scene.camera.clone(),
+            integrator: integrator.to_owned(),
+            software: SOFTWARE.to_owned(),
+            units: Self::UNITS.to_owned(),
+            world_to_camera: world_to_camera.to_cols_array(),
+        }
+    }
+}
+
+/// Writes the layers which `settings` asks for, the beauty first and always.
+///
+/// Returns how many numbers lay beyond the range of f16 (±65504) and were written as its end: 0 for
+/// 32-bit files. Only the beauty is ever 16 bits; the other layers keep 32.
+///
+/// # Errors
+/// When the file cannot be encoded or written.
+pub fn write_exr(
+    path: &Path,
+    film: &Film,
+    settings: &RenderSettings,
+    metadata: &FrameMetadata,
+) -> Result<u64, OutputError> {
+    let size = Vec2(film.size().0 as usize, film.size().1 as usize);
+    let mut layers = Layers::<AnyChannels<FlatSamples>>::new();
+    let mut saturated = 0;
+    let others = settings.layers.iter().copied().filter(|&layer| layer != Layer::Beauty);
+    let mut written = Vec::new();
+    for layer in [Layer::Beauty].into_iter().chain(others) {
+        if written.contains(&layer) {
+            continue; // parts of a file must differ in name
+        }
+        written.push(layer);
+        let Some(planes) = film.image(layer) else { continue };
+        let halves = layer == Layer::Beauty && settings.exr_bits == 16;
+        let channels = planes.into_iter().map(|plane| channel(plane, halves, &mut saturated));
+        layers.push(exr::image::Layer::new(
+            size,
+            layer_attributes(layer, metadata)?,
+            encoding(layer),
+            AnyChannels::sort(channels.collect()),
+        ));
+    }
+    let mut bytes = Vec::new();
+    Image::from_layers(image_attributes(size), layers)
+        .write()
+        .to_buffered(Cursor::new(&mut bytes))
+        .map_err(|source| OutputError::Exr { path: path.to_owned(), source })?;
+    write_atomically(path, &bytes)?;
+    Ok(saturated)
+}
+
+/// Reads the facts of a frame from the header of its first part; `None` where the file has none.
+///
+/// # Errors
+/// When the file cannot be opened or is not an EXR file.
+pub fn read_metadata(path: &Path) -> Result<Option<FrameMetadata>, ExrError> {
+    let headers = MetaData::read_from_file(path, false)?.headers;
+    let attribute =
+        headers.first().and_then(|header| header.own_attributes.other.get(ATTRIBUTE.as_bytes()));
+    Ok(match attribute {
+        Some(AttributeValue::Text(text)) => serde_json::from_str(&text.to_string()).ok(),
+        _ => None,
+    })
+}
+
+fn image_attributes(size: Vec2<usize>) -> ImageAttributes {
+    let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let [red, green, blue, white] = CHROMATICITIES.map(|(x, y)| Vec2(x, y));
+    attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
+    attributes
+}
+
+fn layer_attributes(
+    layer: Layer,
+    metadata: &FrameMetadata,
+) -> Result<LayerAttributes, OutputError> {
+    let json = serde_json::to_string(metadata).map_err(|source| OutputError::Json { source })?;
+    let mut attributes = LayerAttributes::named(layer_name(layer));
+    attributes.software_name = Some(Text::from(metadata.software.as_str()));
+    attributes.world_to_camera = Some(row_vector_convention(metadata.world_to_camera));
+    attributes.frames_per_second = rational(metadata.fps);
+    attributes.other.insert(Text::from(ATTRIBUTE), AttributeValue::Text(Text::from(json.as_str())));
+    Ok(attributes)
+}
+
+/// OpenEXR (Imath) multiplies row vectors from the left and stores rows: that is our column-major order
+/// for column vectors, number by number.
+fn row_vector_convention(world_to_camera: [f64; 16]) -> [f32; 16] {
+    world_to_camera.map(|value| value as f32)
+}
+
+/// Frames per second as a fraction in thousandths, or nothing where that is not exact enough: 23.976
+/// becomes 23976/1000.
+fn rational(fps: f64) -> Option<(i32, u32)> {
+    let thousandths = (fps * 1000.0).round();
+    let exact = (1.0..=f64::from(i32::MAX)).contains(&thousandths);
+    exact.then_some((thousandths as i32, 1000))
+}
+
+fn layer_name(layer: Layer) -> &'static str {
+    match layer {
+        Layer::Beauty => "beauty",
+        Layer::Albedo => "albedo",
+        Layer::Normal => "normal",
+        Layer::Depth => "depth",
+        Layer::Position => "position",
+        Layer::Motion => "motion",
+        Layer::ObjectId => "object_id",
+        Layer::Samples => "samples",
+        Layer::Variance => "variance",
+    }
+}
+
+/// Every compression used here is lossless. Ids and counts run long: run lengths suit them.
+fn encoding(layer: Layer) -> Encoding {
+    let compression = match layer {
+        Layer::ObjectId | Layer::Samples => Compression::RLE,
+        _ => Compression::ZIP16,
+    };
+    Encoding { compression, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing }
+}
+
+fn channel(plane: Plane, halves: bool, saturated: &mut u64) -> AnyChannel<FlatSamples> {
+    let samples = match plane.samples {
+        PlaneSamples::U32(values) => FlatSamples::U32(values),
+        PlaneSamples::F32(values) if halves => {
+            let limit = f16::MAX.to_f32();
+            *saturated += values.iter().filter(|value| value.abs() > limit).count() as u64;
+            FlatSamples::F16(
+                values.iter().map(|value| f16::from_f32(value.clamp(-limit, limit))).collect(),
+            )
+        }
+        PlaneSamples::F32(values) => FlatSamples::F32(values),
+    };
+    AnyChannel::new(plane.name, samples)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::description::{Rgb, SceneDescription};
+    use crate::film::{PixelSample, Tile};
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+
+    pub fn metadata(fingerprint: u128) -> FrameMetadata {
+        let mut scene = SceneDescription { camera: "eye".into(), ..Default::default() };
+        scene.render.seed = u64::MAX;
+        let view = DMat4::from_translation(glam::DVec3::new(1.0, 2.0, 3.0));
+        FrameMetadata::new(Fingerprint(fingerprint), 12, &scene, "Path", view)
+    }
+
+    pub fn film(values: &[f32], layers: &[Layer]) -> Film {
+        let mut film = Film::new((values.len() as u32, 1), layers).expect("small");
+        let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: values.len() as u32, y1: 1 });
+        for (x, &value) in values.iter().enumerate() {
+            let radiance = Rgb::new(value, 0.5 * value, 0.0);
+            buffer.add(x as u32, 0, &PixelSample { radiance, first_hit: None });
+        }
+        film.merge(buffer);
+        film
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("f.exr");
+        let layers = vec![Layer::Samples, Layer::Depth, Layer::Beauty, Layer::Samples];
+        let film = film(&[0.0, 0.1, 1e30, 1e-30], &layers);
+        let settings = RenderSettings { layers, ..Default::default() };
+        assert_eq!(write_exr(&path, &film, &settings, &metadata(7)).expect("writable"), 0);
+        assert_eq!(read_metadata(&path).expect("just written"), Some(metadata(7)));
+
+        let back = read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_file(&path)
+            .expect("just written");
+        let names: Vec<String> = back
+            .layer_data
+            .iter()
+            .map(|l| l.attributes.layer_name.clone().expect("named").to_string())
+            .collect();
+        assert_eq!(names, ["beauty", "samples", "depth"]);
+        let channel = |layer: usize, index: usize| {
+            back.layer_data[layer].channel_data.list[index].sample_data.clone()
+        };
+        assert_eq!(
+            channel(0, 2),
+            FlatSamples::F32(vec![0.0, 0.1, 1e30, 1e-30]),
+            "red is last: B, G, R"
+        );
+        assert_eq!(channel(1, 0), FlatSamples::U32(vec![1; 4]));
+        assert_eq!(channel(2, 0), FlatSamples::F32(vec![f32::INFINITY; 4]));
+        let attributes = &back.layer_data[0].attributes;
+        assert_eq!(attributes.world_to_camera.expect("set")[12..15], [1.0, 2.0, 3.0]);
+        assert_eq!(attributes.frames_per_second, Some((24_000, 1000)));
+        assert!(back.attributes.chromaticities.is_some());
+    }
+
+    #[test]
+    fn halves_saturate_and_say_how_often() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("f.exr");
+        let settings = RenderSettings { exr_bits: 16, ..Default::default() };
+        let film = film(&[1e30, 65504.0, 100_000.0, 1.0], &settings.layers);
+        // Red twice, green (half of it) once.
+        assert_eq!(write_exr(&path, &film, &settings, &metadata(7)).expect("writable"), 3);
+        let back = exr::prelude::read_all_flat_layers_from_file(&path).expect("just written");
+        let FlatSamples::F16(red) = &back.layer_data[0].channel_data.list[2].sample_data else {
+            panic!("beauty is not f16")
+        };
+        assert_eq!(
+            red.iter().map(|v| v.to_f32()).collect::<Vec<_>>(),
+            [65504.0, 65504.0, 65504.0, 1.0]
+        );
+    }
+
+    #[test]
+    fn equal_frames_are_equal_files() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let settings = RenderSettings::default();
+        let film = film(&[0.3, 0.7], &settings.layers);
+        let bytes = |name| {
+            let path = folder.path().join(name);
+            write_exr(&path, &film, &settings, &metadata(7)).expect("writable");
+            std::fs::read(path).expect("just written")
+        };
+        assert_eq!(bytes("a.exr"), bytes("b.exr"));
+    }
+}
