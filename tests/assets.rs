@@ -131,6 +131,8 @@ fn the_knife_ends_where_its_drawing_says_and_its_handle_is_smooth() {
     }
 }
 
+type Motion = fn(f64) -> f64;
+
 /// Oracle: the formulas, between the keys, where the Hermite curve is free to differ.
 #[test]
 fn the_key_lists_follow_their_formulas_between_the_keys() {
@@ -140,7 +142,6 @@ fn the_key_lists_follow_their_formulas_between_the_keys() {
         let tau = 24.0 * (t - 1.0);
         5.0 * (-tau / 5.0).exp() * (TAU * tau / 3.0).sin()
     };
-    type Motion = fn(f64) -> f64;
     for (text, formula, tolerance) in
         [(keys::swing(), swing as Motion, 2.6e-4), (keys::ringing(), ringing as Motion, 5.1e-3)]
     {

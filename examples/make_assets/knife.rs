@@ -83,7 +83,7 @@ pub fn handle() -> String {
     for (section, outward) in [(0, 1.0), (HANDLE.len() - 1, -1.0)] {
         let [x, top, bottom, _] = HANDLE[section];
         let (centre, normal) = (points.len(), normals.len());
-        points.push([x, (top + bottom) / 2.0, 0.0]);
+        points.push([x, f64::midpoint(top, bottom), 0.0]);
         normals.push([outward, 0.0, 0.0]);
         for j in 0..AROUND {
             let (a, b) = (section * AROUND + j, section * AROUND + (j + 1) % AROUND);
@@ -98,7 +98,7 @@ pub fn handle() -> String {
 fn on_handle([x, top, bottom, t]: [f64; 4], j: usize) -> Point {
     let (sin, cos) = (TAU * j as f64 / AROUND as f64).sin_cos();
     let bulge = |c: f64| c.signum() * c.abs().powf(0.7);
-    [x, (top + bottom) / 2.0 + (top - bottom) / 2.0 * bulge(cos), t * bulge(sin)]
+    [x, f64::midpoint(top, bottom) + (top - bottom) / 2.0 * bulge(cos), t * bulge(sin)]
 }
 
 /// Per point the sum of the area vectors of its faces, brought to unit length.
@@ -128,6 +128,7 @@ fn minus(a: Point, b: Point) -> Point {
 
 impl Solid {
     /// Writes the solid, millimetres turned to metres, to a micrometre.
+    #[expect(clippy::float_cmp, reason = "corners at the tip are the same numbers")]
     fn to_obj(&self, what: &str) -> String {
         let mut text = format!("# {what}\n# Metres. Written by the example `make_assets`.\n");
         for p in &self.points {

@@ -75,12 +75,6 @@ impl<'a> Asset<'a> {
         Ok(Self { path, root, blob })
     }
 
-    /// The files beside this one which hold its buffers.
-    pub fn buffer_files(&self) -> Result<Vec<PathBuf>, AssetError> {
-        let uris = self.root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
-        uris.filter(|uri| !uri.starts_with("data:")).map(|uri| self.beside(uri)).collect()
-    }
-
     /// The file that a relative URI names, which must not lead out of the folder.
     fn beside(&self, uri: &str) -> Result<PathBuf, AssetError> {
         let outside =
@@ -93,7 +87,17 @@ impl<'a> Asset<'a> {
         if !inside || name.as_os_str().is_empty() || uri.contains([':', '\\']) {
             return Err(outside());
         }
-        Ok(self.path.parent().unwrap_or(Path::new("")).join(name))
+        let folder = match self.path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        let file = folder.join(name);
+        // Links are followed first: one could lead out as well.
+        let real = |path: &Path| {
+            fs::canonicalize(path)
+                .map_err(|cause| AssetError::Read { path: path.to_owned(), cause })
+        };
+        if real(&file)?.starts_with(real(folder)?) { Ok(file) } else { Err(outside()) }
     }
 
     fn buffers(&mut self) -> Result<Vec<Vec<u8>>, AssetError> {
@@ -380,7 +384,7 @@ fn assemble(indices: &[u32], mode: Mode) -> Box<dyn Iterator<Item = [u32; 3]> + 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::assets::{load_mesh, mesh_files, tidy};
+    use crate::description::assets::{load_mesh, tidy};
     use serde_json::json;
     use std::borrow::Cow;
 
@@ -597,8 +601,6 @@ mod tests {
         document["buffers"][0]["uri"] = json!("my%20data/b.bin");
         std::fs::write(&path, document.to_string()).unwrap();
         assert_eq!(load_mesh(&path).unwrap().triangles.len(), 2);
-        let files = mesh_files(&path).unwrap();
-        assert_eq!(files, [path.clone(), folder.path().join("my data/b.bin")]);
         let absolute = folder.path().join("my data/b.bin").display().to_string();
         let hostile =
             ["../b.bin", "%2e%2e/b.bin", "a/../../b", "http://host/b", "", "%", "%00", &absolute];
@@ -608,9 +610,27 @@ mod tests {
             let error = load_mesh(&path).unwrap_err();
             assert!(matches!(error, AssetError::OutsideFile { .. }), "{uri}: {error}");
         }
+        document["buffers"][0]["uri"] = json!("absent.bin");
+        std::fs::write(&path, document.to_string()).unwrap();
+        assert!(load_mesh(&path).unwrap_err().to_string().contains("absent.bin"));
         document["buffers"][0]["uri"] = json!("data:application/octet-stream;base64,AAAA");
         std::fs::write(&path, document.to_string()).unwrap();
         assert!(load_mesh(&path).unwrap_err().to_string().contains("expected 98"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_out_of_the_folder_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("inside");
+        std::fs::create_dir(&inside).unwrap();
+        let (mut document, bytes) = square();
+        std::fs::write(folder.path().join("secret.bin"), &bytes).unwrap();
+        std::os::unix::fs::symlink(folder.path().join("secret.bin"), inside.join("b.bin")).unwrap();
+        document["buffers"][0]["uri"] = json!("b.bin");
+        let path = inside.join("square.gltf");
+        std::fs::write(&path, document.to_string()).unwrap();
+        assert!(matches!(load_mesh(&path).unwrap_err(), AssetError::OutsideFile { .. }));
     }
 
     /// Whatever the bytes: an error or a sound mesh.

@@ -34,10 +34,10 @@ pub fn load_image(path: &Path, encoding: Encoding) -> Result<ImageData, AssetErr
 
 /// Decodes everything but OpenEXR.
 fn decode(bytes: &[u8], encoding: Encoding, path: &Path) -> Result<ImageData, AssetError> {
-    let failed = |source| AssetError::Image { path: path.to_owned(), source };
+    let failed = |cause| AssetError::Image { path: path.to_owned(), cause };
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
-        .map_err(|source| AssetError::Read { path: path.to_owned(), source })?;
+        .map_err(|cause| AssetError::Read { path: path.to_owned(), cause })?;
     if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) {
         return Err(AssetError::UnknownFormat {
             path: path.to_owned(),
@@ -100,7 +100,7 @@ fn check_size(width: u64, height: u64, path: &Path) -> Result<(), AssetError> {
 }
 
 fn read_exr(bytes: &[u8], path: &Path) -> Result<ImageData, AssetError> {
-    let failed = |source| AssetError::Exr { path: path.to_owned(), source };
+    let failed = |cause| AssetError::Exr { path: path.to_owned(), cause };
     // Metadata alone first, so that a forged size is refused before memory is taken for it.
     let metadata =
         exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
@@ -217,8 +217,8 @@ mod tests {
         let image = load_image(&path, Encoding::Srgb).unwrap();
         let ImagePixels::Rgba32F(pixels) = image.pixels else { panic!("floats") };
         assert_eq!((image.width, image.height), (3, 2));
-        assert_eq!(pixels[1], [1.0, 0.5, 1e6, 1.0]);
-        assert_eq!(pixels[5], [2.0, 1.5, 1e6, 1.0]);
+        assert_eq!(pixels[1].map(f32::to_bits), [1.0, 0.5, 1e6, 1.0].map(f32::to_bits));
+        assert_eq!(pixels[5].map(f32::to_bits), [2.0, 1.5, 1e6, 1.0].map(f32::to_bits));
     }
 
     /// An image is known by its contents: a wrong ending does no harm.

@@ -35,12 +35,12 @@ pub const MAX_IMAGE_BYTES: u64 = 2 << 30;
 /// the memory that a small file can ask for by naming its geometry many times.
 pub const MAX_MESH_ELEMENTS: usize = 1 << 26;
 
-/// Why a file that a scene names could not be used.
+/// Why a file that a scene names could not be used. Messages are whole: they end with their cause.
 #[expect(missing_docs, reason = "each message names its fields")]
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
-    #[error("cannot read `{path}`", path = .path.display())]
-    Read { path: PathBuf, source: io::Error },
+    #[error("cannot read `{path}`: {cause}", path = .path.display())]
+    Read { path: PathBuf, cause: io::Error },
     #[error(
         "`{path}` is too large: {found}, where at most {limit} are allowed",
         path = .path.display()
@@ -52,15 +52,15 @@ pub enum AssetError {
     )]
     UnknownFormat { path: PathBuf, found: String, expected: &'static str },
     #[error(
-        "`{path}` is not a sound image; it may be cut off: write it anew",
+        "`{path}` is not a sound image, or is cut off: {cause}",
         path = .path.display()
     )]
-    Image { path: PathBuf, source: ::image::ImageError },
+    Image { path: PathBuf, cause: ::image::ImageError },
     #[error(
-        "`{path}` is not an OpenEXR file with the channels R, G and B",
+        "`{path}` is not a sound OpenEXR file with the channels R, G and B: {cause}",
         path = .path.display()
     )]
-    Exr { path: PathBuf, source: exr::error::Error },
+    Exr { path: PathBuf, cause: exr::error::Error },
     #[error("`{path}`, line {line}: {message}", path = .path.display())]
     Obj { path: PathBuf, line: usize, message: String },
     #[error("`{path}`: {message}", path = .path.display())]
@@ -99,18 +99,6 @@ pub fn load_mesh(path: &Path) -> Result<TriangleMesh, AssetError> {
     }
 }
 
-/// The files that [`load_mesh`] reads for this mesh, itself first: a `.gltf` may name buffers.
-///
-/// # Errors
-/// When the file cannot be read, or is a glTF whose list of buffers is malformed.
-pub fn mesh_files(path: &Path) -> Result<Vec<PathBuf>, AssetError> {
-    let mut files = vec![path.to_owned()];
-    if mesh_format(path)? == MeshFormat::Gltf {
-        files.extend(gltf::Asset::open(path)?.buffer_files()?);
-    }
-    Ok(files)
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum MeshFormat {
     Obj,
@@ -135,7 +123,7 @@ fn mesh_format(path: &Path) -> Result<MeshFormat, AssetError> {
 
 /// Reads a whole file of at most [`MAX_FILE_BYTES`].
 fn read_file(path: &Path) -> Result<Vec<u8>, AssetError> {
-    let failed = |source| AssetError::Read { path: path.to_owned(), source };
+    let failed = |cause| AssetError::Read { path: path.to_owned(), cause };
     let file = File::open(path).map_err(failed)?;
     let metadata = file.metadata().map_err(failed)?;
     // Opening a folder succeeds on some systems; reading it would fail with a stranger message.
@@ -161,6 +149,7 @@ fn too_large(path: &Path, found: String, limit: impl ToString) -> AssetError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::Encoding;
 
     #[test]
     fn a_missing_file_and_an_unknown_ending_are_named_in_the_error() {
@@ -168,7 +157,7 @@ mod tests {
         assert!(error.to_string().contains("rabbit.obj"), "{error}");
         let error = load_mesh(Path::new("rabbit.stl")).unwrap_err();
         assert!(error.to_string().contains("`.stl`") && error.to_string().contains("`.glb`"));
-        let error = load_image(Path::new("nowhere/wood.png"), Default::default()).unwrap_err();
+        let error = load_image(Path::new("nowhere/wood.png"), Encoding::Srgb).unwrap_err();
         assert!(error.to_string().contains("wood.png"), "{error}");
     }
 
