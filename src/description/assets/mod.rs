@@ -2,13 +2,15 @@
 //!
 //! - [`image`](load_image): PNG, JPEG, Radiance HDR, OpenEXR; known by their contents, not by name;
 //! - `obj`: Wavefront OBJ; `polygon` cuts its faces into triangles;
-//! - `gltf`: the geometry of glTF 2.0, as `.gltf` or `.glb`; `accessor` reads its numbers;
+//! - `gltf`: the geometry of glTF 2.0, as `.gltf` or `.glb`; `accessor` reads its numbers,
+//!   `gather` puts its parts together;
 //! - `tidy`: what every mesh must hold before a renderer may trust it.
 //!
 //! Any bytes may stand in a file. Whatever they are, the answer is a sound value or an
 //! [`AssetError`], within the limits below; never a panic.
 
 mod accessor;
+mod gather;
 mod gltf;
 mod image;
 mod obj;
