@@ -8,5 +8,6 @@ pub mod math;
 pub mod output;
 pub mod sampling;
 pub mod shade;
+pub mod shape;
 pub mod step;
 pub mod world;

@@ -1,5 +1,6 @@
 //! Scene files to plain, validated data: no ECS, no rendering.
 
+pub mod assets;
 mod camera;
 mod light;
 mod material;

@@ -3,11 +3,13 @@
 mod bounds;
 mod frame;
 mod motion;
+mod ray;
 
 mod rounding;
 
 pub use bounds::Aabb;
 pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
+pub use ray::Ray;
 
 pub use rounding::{gamma, gamma_f64, next_after_magnitude, offset_ray_origin};

@@ -1,0 +1,115 @@
+//! The surface where a ray hit it, in render space.
+
+use super::{Hit, MeshTree, SceneGeometry};
+use crate::extract::Geometry;
+use crate::math::{Frame, Ray};
+use crate::shape::{LocalSurface, rounding_error};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
+
+/// A point of a surface in render space.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// The point.
+    pub p: DVec3,
+    /// Bound of its error per axis, before it is rounded to `f32`.
+    pub p_error: DVec3,
+    /// Unit geometric normal, to the outside of the object.
+    pub ng: Vec3,
+    /// Unit shading normal, on the same side as `ng`.
+    pub ns: Vec3,
+    /// Surface coordinates.
+    pub uv: Vec2,
+    /// Direction in which u grows; may be 0.
+    pub dpdu: Vec3,
+}
+
+impl SurfacePoint {
+    /// A point given in the space of its shape, carried to render space.
+    pub fn new(local: &LocalSurface, forward: &DAffine3, inverse: &DAffine3) -> Self {
+        let p = forward.transform_point3(local.p);
+        // The error of going to render space, and of the way back that the next ray will take.
+        let back = rounding_error(inverse, p);
+        let m = &forward.matrix3;
+        let p_error = rounding_error(forward, local.p)
+            + m.x_axis.abs() * back.x
+            + m.y_axis.abs() * back.y
+            + m.z_axis.abs() * back.z;
+        // Normals go by the transposed inverse, which keeps the outside outside for mirroring maps.
+        let normal = |n: DVec3| (inverse.matrix3.transpose() * n).normalize();
+        let ng = normal(local.ng);
+        let ns = if local.ns == local.ng { ng } else { normal(local.ns) };
+        let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
+        let ns = if ns.is_finite() { ns } else { ng };
+        let dpdu = forward.transform_vector3(local.dpdu).try_normalize().unwrap_or(DVec3::ZERO);
+        Self {
+            p,
+            p_error,
+            ng: ng.as_vec3(),
+            ns: ns.as_vec3(),
+            uv: local.uv,
+            dpdu: dpdu.as_vec3(),
+        }
+    }
+
+    /// The shading frame: z is `ns`, x follows u.
+    pub fn frame(&self) -> Frame {
+        Frame::from_z_and_tangent(self.ns, self.dpdu)
+    }
+}
+
+impl SceneGeometry<'_> {
+    /// The surface where `ray` hit.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let instance = &self.instances[hit.instance as usize];
+        let (forward, inverse) = instance.motion.both_at(ray.time);
+        let local = match instance.geometry {
+            Geometry::Primitive(primitive) => {
+                primitive.surface(inverse.transform_point3(ray.at(hit.t)), hit.primitive)
+            }
+            Geometry::Mesh(mesh) => {
+                self.meshes[mesh as usize].surface(hit.primitive, hit.weights)
+            }
+        };
+        SurfacePoint::new(&local, &forward, &inverse)
+    }
+
+    /// Where the point of the surface that `ray` hit is at another time of the shutter.
+    pub fn point_at(&self, ray: &Ray, hit: &Hit, time: f32) -> DVec3 {
+        let motion = &self.instances[hit.instance as usize].motion;
+        motion.at(time).transform_point3(motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)))
+    }
+}
+
+impl MeshTree {
+    /// The surface of a triangle at these weights of its second and third corner.
+    pub fn surface(&self, triangle: u32, weights: DVec2) -> LocalSurface {
+        let corners = self.corners(triangle).map(Vec3::as_dvec3);
+        let [a, b, c] = corners;
+        let barycentric = [1.0 - weights.x - weights.y, weights.x, weights.y];
+        // Both edges in units of the longest component: their product neither under- nor overflows.
+        let (e1, e2) = (b - a, c - a);
+        let size = e1.abs().max(e2.abs()).max_element();
+        let ng = (e1 / size).cross(e2 / size);
+        let indices = self.mesh.triangles[triangle as usize];
+        let ns = if self.mesh.normals.is_empty() {
+            ng
+        } else {
+            let sum: DVec3 = (0..3)
+                .map(|k| self.mesh.normals[indices[k] as usize].as_dvec3() * barycentric[k])
+                .sum();
+            // Opposite normals may cancel.
+            if sum.length_squared() > 0.0 { sum } else { ng }
+        };
+        let uvs = if self.mesh.uvs.is_empty() {
+            [Vec2::ZERO, Vec2::X, Vec2::ONE]
+        } else {
+            indices.map(|k| self.mesh.uvs[k as usize])
+        };
+        let uv = (0..3).map(|k| uvs[k].as_dvec2() * barycentric[k]).sum::<DVec2>();
+        let (d1, d2) = ((uvs[1] - uvs[0]).as_dvec2(), (uvs[2] - uvs[0]).as_dvec2());
+        let det = d1.perp_dot(d2);
+        let dpdu = if det == 0.0 { e1 } else { (e1 * d2.y - e2 * d1.y) * det.signum() };
+        let p = a * barycentric[0] + b * barycentric[1] + c * barycentric[2];
+        LocalSurface { p, ng, ns, uv: uv.as_vec2(), dpdu }
+    }
+}

@@ -1,0 +1,9 @@
+//! Lights: which there are, choosing one, and drawing a direction towards it.
+
+mod sky;
+mod table;
+mod towards;
+
+pub use sky::SkyLight;
+pub use table::{Emitted, Emitter, LightTable, rebuild_light_table};
+pub use towards::{LightSample, Lights, Receiver, ShadowEnd};

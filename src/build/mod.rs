@@ -1,0 +1,19 @@
+//! Structures over the flat arrays: bounding volume hierarchies and the table of lights.
+
+pub mod bvh;
+pub mod light;
+
+use crate::frame::FrameSystems;
+use bevy_ecs::prelude::*;
+
+/// Adds the resources and the systems of this stage.
+pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
+    world.insert_resource(bvh::MeshTrees::default());
+    world.insert_resource(bvh::TopLevel::default());
+    world.insert_resource(light::LightTable::default());
+    frame.add_systems(
+        (bvh::rebuild_mesh_trees, bvh::rebuild_top_level, light::rebuild_light_table)
+            .chain()
+            .in_set(FrameSystems::Build),
+    );
+}

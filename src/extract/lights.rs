@@ -1,0 +1,84 @@
+//! Lights without a shape as a table.
+
+use super::{FrameOrigin, NOTHING, SurfaceSlots};
+use crate::description::{Rgb, Value};
+use crate::math::MotionTransform;
+use crate::world::{EmissionFactor, Light, ShutterMotion};
+use bevy_ecs::prelude::*;
+use std::convert::Infallible;
+
+/// A light without a shape in render space. It shines along its local −z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PunctualLight {
+    /// What it is, its strengths multiplied by the keyed factor.
+    pub light: crate::description::Light<u32>,
+    /// Render space from the light's space.
+    pub motion: MotionTransform,
+}
+
+/// All lights without a shape, in the order of spawning.
+#[derive(Resource, Clone, Debug, Default, PartialEq)]
+pub struct PunctualLights(pub Vec<PunctualLight>);
+
+/// Writes [`PunctualLights`] when it is different from before.
+pub fn extract_lights(
+    origin: Res<FrameOrigin>,
+    slots: Res<SurfaceSlots>,
+    lights: Query<(Entity, &Light, &ShutterMotion, Option<&EmissionFactor>)>,
+    mut table: ResMut<PunctualLights>,
+) {
+    let mut found: Vec<(Entity, PunctualLight)> = lights
+        .iter()
+        .map(|(entity, light, motion, factor)| {
+            let mut texture_of = |texture: Entity| {
+                Ok::<u32, Infallible>(slots.textures.get(&texture).copied().unwrap_or(NOTHING))
+            };
+            let Ok(light) = light.clone().map_ref(&mut texture_of);
+            let keys: Vec<_> = motion
+                .keys
+                .iter()
+                .map(|key| {
+                    let mut key = *key;
+                    key.translation -= origin.0;
+                    key
+                })
+                .collect();
+            let light = scaled(light, factor.map_or(1.0, |f| f.0 as f32));
+            (entity, PunctualLight { light, motion: MotionTransform::new(&keys) })
+        })
+        .collect();
+    found.sort_unstable_by_key(|(entity, _)| (entity.index_u32(), entity.generation()));
+    table.set_if_neq(PunctualLights(found.into_iter().map(|(_, light)| light).collect()));
+}
+
+/// The light with its strength multiplied.
+fn scaled(light: crate::description::Light<u32>, factor: f32) -> crate::description::Light<u32> {
+    use crate::description::Light;
+    match light {
+        Light::Point { intensity, power } => {
+            Light::Point { intensity: intensity.map(|i| i * factor), power: power.map(|p| p * factor) }
+        }
+        Light::Spot { intensity, angle, blend } => {
+            Light::Spot { intensity: intensity * factor, angle, blend }
+        }
+        Light::Directional { irradiance, angle } => {
+            Light::Directional { irradiance: irradiance * factor, angle }
+        }
+        Light::Sky { radiance, scale } => Light::Sky { radiance, scale: scale * factor },
+    }
+}
+
+impl PunctualLight {
+    /// Intensity of a point light, W·sr⁻¹ per channel.
+    pub fn point_intensity(intensity: Option<Rgb>, power: Option<Rgb>) -> Rgb {
+        intensity.or(power.map(|p| p / (4.0 * std::f32::consts::PI))).unwrap_or(Rgb::ZERO)
+    }
+
+    /// The texture of an environment map.
+    pub fn environment_map(&self) -> Option<u32> {
+        match self.light {
+            crate::description::Light::Sky { radiance: Value::Texture(texture), .. } => Some(texture),
+            _ => None,
+        }
+    }
+}

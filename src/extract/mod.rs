@@ -1,0 +1,40 @@
+//! World to flat arrays: here the ECS ends.
+//!
+//! Each table is a resource of its own, written only when something it is made of changed, so that
+//! the build stage can ask each table whether it must do anything. Everything is relative to the
+//! *origin of the frame*, the position of the camera when the shutter opens: subtracted in `f64`, so
+//! that a scene may be anywhere.
+
+mod camera;
+mod instances;
+mod lights;
+mod requirements;
+mod surfaces;
+
+pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
+pub use instances::{
+    Geometry, Instance, Instances, Meshes, NOTHING, extract_instances, extract_meshes,
+};
+pub use lights::{PunctualLight, PunctualLights, extract_lights};
+pub use requirements::{Feature, Requirements, derive_requirements};
+pub use surfaces::{SurfaceEmission, SurfaceSlots, Surfaces, extract_surfaces};
+
+use crate::frame::FrameSystems;
+use bevy_ecs::prelude::*;
+
+/// Adds the tables and the systems of this stage.
+pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
+    world.insert_resource(FrameOrigin::default());
+    world.insert_resource(ViewCamera::default());
+    world.insert_resource(Meshes::default());
+    world.insert_resource(Instances::default());
+    world.insert_resource(Surfaces::default());
+    world.insert_resource(SurfaceSlots::default());
+    world.insert_resource(PunctualLights::default());
+    world.insert_resource(Requirements::default());
+    frame.add_systems(
+        (extract_camera, extract_surfaces, extract_meshes, extract_instances, extract_lights, derive_requirements)
+            .chain()
+            .in_set(FrameSystems::Extract),
+    );
+}
