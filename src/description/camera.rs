@@ -1,9 +1,10 @@
 //! Cameras, as a scene file says them.
 
-use serde::Deserialize;
+use serde::de::{self, Deserialize, Deserializer, Visitor};
+use std::fmt;
 
 /// A camera at its local origin which looks along its local −z with +y up. `R` refers to an entity.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 #[serde(bound(deserialize = "Focus<R>: Deserialize<'de>"))]
 pub struct Camera<R> {
@@ -40,6 +41,31 @@ pub enum Focus<R> {
     Distance(f64),
     /// The origin of this entity, wherever it moves.
     Entity(R),
+}
+
+impl<'de> Deserialize<'de> for Focus<String> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct FocusVisitor;
+        impl Visitor<'_> for FocusVisitor {
+            type Value = Focus<String>;
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a distance in metres or the name of an entity")
+            }
+            fn visit_f64<E: de::Error>(self, v: f64) -> Result<Self::Value, E> {
+                Ok(Focus::Distance(v))
+            }
+            fn visit_i64<E: de::Error>(self, v: i64) -> Result<Self::Value, E> {
+                Ok(Focus::Distance(v as f64))
+            }
+            fn visit_u64<E: de::Error>(self, v: u64) -> Result<Self::Value, E> {
+                Ok(Focus::Distance(v as f64))
+            }
+            fn visit_str<E: de::Error>(self, v: &str) -> Result<Self::Value, E> {
+                Ok(Focus::Entity(v.to_owned()))
+            }
+        }
+        deserializer.deserialize_any(FocusVisitor)
+    }
 }
 
 impl<R> Default for Camera<R> {

@@ -2,9 +2,11 @@
 
 pub mod assets;
 mod camera;
+mod diagnostic;
 mod light;
 mod material;
 mod motion;
+mod read;
 mod scene;
 mod settings;
 mod shape;
@@ -12,11 +14,13 @@ mod texture;
 mod value;
 
 pub use camera::{Camera, Focus, SENSOR_HEIGHT};
+pub use diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
 pub use light::{Emission, EmissionStrength, Light};
 pub use material::{Attenuation, Material, Metal};
 pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
+pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
 pub use settings::{Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};

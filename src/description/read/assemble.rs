@@ -1,0 +1,410 @@
+//! The definitions of all files of a scene, gathered by name and read one by one.
+
+use super::decode::{Report, decode, decode_fields};
+use super::files::{self, MAX_ASSET_BYTES};
+use super::limits;
+use super::outline::Kind;
+use super::overrides::FIELDS;
+use super::source::{Cursor, Source};
+use super::surface::{self, MeshFile};
+use super::{ContentHash, LoadOptions, Names, entity, relations};
+use crate::description::assets::{load_image, load_mesh};
+use crate::description::diagnostic::{Diagnostics, suggestion};
+use crate::description::{
+    Clock, Encoding, Filter, ImageData, RenderSettings, SceneDescription, Texture, TriangleMesh,
+};
+use indexmap::IndexMap;
+use indexmap::map::Entry;
+use std::collections::HashMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Everything that the files of a scene define.
+#[derive(Default)]
+struct Definitions<'a> {
+    names: Names<'a>,
+    clock: IndexMap<String, Cursor<'a>>,
+    render: IndexMap<String, Cursor<'a>>,
+    camera: Option<Cursor<'a>>,
+}
+
+/// Makes a scene of its files, of which the last is the one that was asked for.
+pub(super) fn assemble(
+    sources: &[Source],
+    complete: bool,
+    options: &LoadOptions,
+    (files, hash): (Vec<PathBuf>, ContentHash),
+    mut report: Report,
+) -> Result<SceneDescription, Diagnostics> {
+    let report = &mut report;
+    let mut definitions = Definitions::default();
+    for source in sources {
+        let root = source.cursor();
+        look_over(&root, report);
+        gather(&root, &mut definitions, report);
+    }
+    // What could not be gathered may hold the names that seem to be missing.
+    let complete = complete && !report.found.0.iter().any(|d| d.code == "scene::structure");
+    definitions.names.complete = complete;
+    let names = &definitions.names;
+    let mut scene = SceneDescription { files, ..SceneDescription::default() };
+    let clock: Vec<_> = definitions.clock.values().cloned().collect();
+    if let Some(clock) = decode_fields(&clock, report) {
+        scene.clock = clock;
+        check_clock(&clock, &definitions.clock, report);
+    }
+    let render: Vec<_> = definitions.render.values().cloned().collect();
+    if let Some(settings) = decode_fields(&render, report) {
+        check_render(&settings, &definitions.render, report);
+        scene.render = settings;
+    }
+    for (name, cursor) in &names.materials {
+        if let Some(material) = surface::read_material(cursor, names, report) {
+            scene.materials.insert(name.clone(), material);
+        }
+    }
+    for (name, cursor) in &names.entities {
+        if let Some(entity) = entity::read_entity(cursor, names, report) {
+            scene.entities.insert(name.clone(), entity);
+        }
+    }
+    relations::check_cycles(&scene, names, report);
+    if complete {
+        relations::choose_camera(&mut scene, definitions.camera.as_ref(), names, options, report);
+    }
+    let mut assets = Assets { options, hash, images: HashMap::new(), meshes: HashMap::new() };
+    for (name, cursor) in &names.textures {
+        let texture = surface::read_texture(cursor, report);
+        if let Some(texture) = texture.and_then(|t| assets.texture(cursor, t, &mut scene, report)) {
+            scene.textures.insert(name.clone(), texture);
+        }
+    }
+    for (name, cursor) in &names.meshes {
+        if let Some(mesh) = assets.mesh(cursor, &mut scene, report) {
+            scene.meshes.insert(name.clone(), mesh);
+        }
+    }
+    relations::check_shares(&scene, names, report);
+    scene.content_hash = assets.hash.0.digest128();
+    if report.found.has_errors() {
+        Err(in_order(std::mem::take(&mut report.found)))
+    } else {
+        Ok(scene)
+    }
+}
+
+/// The mistakes of each text together and in its order; those without a place at the end.
+fn in_order(mut mistakes: Diagnostics) -> Diagnostics {
+    let texts: Vec<_> =
+        mistakes.0.iter().flat_map(|d| &d.place).map(|p| p.source.clone()).collect();
+    mistakes.0.sort_by_key(|mistake| {
+        mistake.place.as_ref().map_or((usize::MAX, 0), |place| {
+            let text = texts.iter().position(|text| Arc::ptr_eq(text, &place.source));
+            (text.unwrap_or(usize::MAX), place.span.start)
+        })
+    });
+    mistakes
+}
+
+/// Finds what is wrong wherever it stands: numbers which are none, and names given twice.
+fn look_over(cursor: &Cursor, report: &mut Report) {
+    if cursor.node.kind == Kind::Word && is_not_finite(cursor.text()) {
+        let message = format!("`{}` is not a finite number", cursor.text());
+        report.at("scene::not-finite", cursor, message);
+    }
+    let mut seen: HashMap<String, Cursor> = HashMap::new();
+    for entry in cursor.entries() {
+        look_over(&entry, report);
+        if !entry.key.is_empty() {
+            match seen.entry(entry.key()) {
+                std::collections::hash_map::Entry::Vacant(vacant) => {
+                    vacant.insert(entry);
+                }
+                std::collections::hash_map::Entry::Occupied(first) => {
+                    duplicate(&entry, first.get(), report);
+                }
+            }
+        }
+    }
+}
+
+fn duplicate(second: &Cursor, first: &Cursor, report: &mut Report) {
+    let message = format!("`{}` is given twice", second.key());
+    let place = second.key_place();
+    let related = (first.key_place(), "first given here".to_owned());
+    let diagnostic = report.error("scene::duplicate", place, &second.path, message);
+    if diagnostic.related.is_empty() {
+        diagnostic.related.push(related);
+    }
+}
+
+/// Whether a word is a number, but not a finite one of 64 bits.
+fn is_not_finite(word: &str) -> bool {
+    let plain = word.trim_start_matches(['+', '-']);
+    if plain.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+        let digits = plain.replace('_', "");
+        return digits.parse::<f64>().is_ok_and(|number| !number.is_finite());
+    }
+    let named = plain.to_ascii_lowercase();
+    let named = named.trim_end_matches("f32").trim_end_matches("f64");
+    matches!(named, "nan" | "inf" | "infinity")
+}
+
+/// Sorts the parts of a file by what they define.
+fn gather<'a>(root: &Cursor<'a>, definitions: &mut Definitions<'a>, report: &mut Report) {
+    let is_scene = matches!(root.name(), "" | "Scene");
+    let named = root.node.entries.iter().all(|entry| !entry.key.is_empty());
+    if root.node.kind != Kind::Tuple || !is_scene || !named {
+        let message = "a scene file holds `Scene(entities: {…}, …)`";
+        report.at("scene::structure", root, message);
+        return;
+    }
+    for part in root.entries() {
+        let names = &mut definitions.names;
+        match part.key().as_str() {
+            "include" => {}
+            "camera" => definitions.camera = Some(part),
+            "clock" => gather_fields(&part, &mut definitions.clock, report),
+            "render" => gather_fields(&part, &mut definitions.render, report),
+            "textures" => gather_names(&part, &mut names.textures, report),
+            "materials" => gather_names(&part, &mut names.materials, report),
+            "meshes" => gather_names(&part, &mut names.meshes, report),
+            "entities" => gather_names(&part, &mut names.entities, report),
+            other => {
+                let message = format!("a scene has no field `{other}`");
+                report.error("scene::unknown-field", part.key_place(), &part.path, message).help =
+                    suggestion(other, FIELDS, "fields");
+            }
+        }
+    }
+}
+
+/// Fields of later files replace those of the files which they include.
+fn gather_fields<'a>(
+    part: &Cursor<'a>,
+    fields: &mut IndexMap<String, Cursor<'a>>,
+    report: &mut Report,
+) {
+    let named = part.node.entries.iter().all(|entry| !entry.key.is_empty());
+    if part.node.kind != Kind::Tuple || !part.name().is_empty() || !named {
+        let message = format!("`{}` is written as `(field: value, …)`", part.path);
+        report.at("scene::wrong-type", part, message);
+        return;
+    }
+    for field in part.entries() {
+        fields.insert(field.key(), field);
+    }
+}
+
+/// Names are unique in all files together.
+fn gather_names<'a>(
+    part: &Cursor<'a>,
+    names: &mut IndexMap<String, Cursor<'a>>,
+    report: &mut Report,
+) {
+    if part.node.kind != Kind::Map {
+        let message = format!("`{}` is written as `{{\"name\": …, …}}`", part.path);
+        report.at("scene::structure", part, message);
+        return;
+    }
+    for entry in part.entries() {
+        let written = &entry.source.text[entry.key.range()];
+        if !written.ends_with(['"', '#']) {
+            let message = "a name stands in double quotes";
+            report.error("scene::structure", entry.key_place(), &entry.path, message);
+            continue;
+        }
+        match names.entry(entry.key()) {
+            Entry::Vacant(vacant) => {
+                vacant.insert(entry);
+            }
+            Entry::Occupied(first) => duplicate(&entry, first.get(), report),
+        }
+    }
+}
+
+fn check_clock(clock: &Clock, fields: &IndexMap<String, Cursor>, report: &mut Report) {
+    if let Some(fps) = fields.get("fps") {
+        limits::number(report, fps, clock.fps, &limits::FPS);
+    }
+    if let Some(frames) = fields.get("frames") {
+        let (first, last) = clock.frames;
+        let numbers = [first, last].map(f64::from);
+        if limits::vector(report, frames, &numbers, &limits::FRAME) && last < first {
+            let message =
+                format!("no frames: the last frame, {last}, comes before the first, {first}");
+            report.at("scene::empty-range", frames, message);
+        }
+    }
+    if let Some(shutter) = fields.get("shutter") {
+        let (open, close) = clock.shutter;
+        if limits::vector(report, shutter, &[open, close], &limits::SHUTTER) && close < open {
+            let message = format!("the shutter closes at {close}, before it opens at {open}");
+            report.at("scene::empty-range", shutter, message);
+        }
+    }
+}
+
+fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, report: &mut Report) {
+    let (width, height) = render.size;
+    if let Some(size) = fields.get("size") {
+        let sides = [width, height].map(f64::from);
+        if limits::vector(report, size, &sides, &limits::PIXELS) {
+            limits::number(report, size, f64::from(width) * f64::from(height), &limits::AREA);
+        }
+    }
+    let numbers = [
+        ("samples", f64::from(render.samples), &limits::SAMPLES),
+        ("max_depth", f64::from(render.max_depth), &limits::DEPTH),
+        ("roulette_depth", f64::from(render.roulette_depth), &limits::ROULETTE),
+        ("clamp_indirect", f64::from(render.clamp_indirect.unwrap_or(1.0)), &limits::POSITIVE),
+        ("motion_tolerance", render.motion_tolerance, &limits::TOLERANCE),
+        ("exposure", f64::from(render.exposure), &limits::STOPS),
+    ];
+    for (name, value, limits) in numbers {
+        if let Some(field) = fields.get(name) {
+            limits::number(report, field, value, limits);
+        }
+    }
+    if let Some(filter) = fields.get("filter") {
+        let (sigma, radius) = match render.filter {
+            Filter::Gaussian { sigma, radius } => (sigma, radius),
+            Filter::Box { radius } | Filter::BlackmanHarris { radius } => (1.0, radius),
+        };
+        limits::number(report, &filter.at("sigma"), sigma, &limits::FILTER);
+        limits::number(report, &filter.at("radius"), radius, &limits::FILTER);
+    }
+    if let (Some(bits), false) = (fields.get("exr_bits"), matches!(render.exr_bits, 16 | 32)) {
+        let message = format!("`exr_bits` must be 16 or 32, but is {}", render.exr_bits);
+        report.at("scene::out-of-range", bits, message);
+    }
+    if let Some(layers) = fields.get("layers") {
+        if render.layers.is_empty() {
+            report.at("scene::empty", layers, "`layers` needs at least one layer");
+        }
+        for (index, layer) in render.layers.iter().enumerate() {
+            if render.layers[..index].contains(layer) {
+                let message = format!("the layer `{layer:?}` is given twice");
+                report.at("scene::duplicate", &layers.nth(index), message);
+            }
+        }
+    }
+}
+
+/// Finds and reads the files of textures and meshes, each once.
+struct Assets<'o> {
+    options: &'o LoadOptions,
+    hash: ContentHash,
+    images: HashMap<(PathBuf, Encoding), Arc<ImageData>>,
+    meshes: HashMap<PathBuf, Arc<TriangleMesh>>,
+}
+
+impl Assets<'_> {
+    /// Finds a file and adds its bytes to the hash.
+    fn find(
+        &mut self,
+        place: &Cursor,
+        name: &str,
+        scene: &mut SceneDescription,
+        report: &mut Report,
+    ) -> Option<PathBuf> {
+        let dir = place.source.dir.as_deref();
+        let found = files::find(name, dir, self.options, MAX_ASSET_BYTES).and_then(|path| {
+            if !scene.files.contains(&path) {
+                self.hash_file(name, &path).map_err(|source| files::FileError::Unreadable {
+                    name: name.to_owned(),
+                    source,
+                })?;
+            }
+            Ok(path)
+        });
+        match found {
+            Ok(path) => {
+                if !scene.files.contains(&path) {
+                    scene.files.push(path.clone());
+                }
+                Some(path)
+            }
+            Err(error) => {
+                report.at(error.code(), place, error.to_string()).help = error.help();
+                None
+            }
+        }
+    }
+
+    fn hash_file(&mut self, name: &str, path: &Path) -> std::io::Result<()> {
+        self.hash.add(name, &[]);
+        let mut file = std::fs::File::open(path)?;
+        let mut block = vec![0; 1 << 16];
+        let mut length = 0_u64;
+        loop {
+            let count = file.read(&mut block)?;
+            if count == 0 {
+                self.hash.0.update(&length.to_le_bytes());
+                return Ok(());
+            }
+            length += count as u64;
+            self.hash.0.update(&block[..count]);
+        }
+    }
+
+    fn texture(
+        &mut self,
+        cursor: &Cursor,
+        texture: Texture<String>,
+        scene: &mut SceneDescription,
+        report: &mut Report,
+    ) -> Option<Texture<Arc<ImageData>>> {
+        let place = cursor.at("file");
+        let image = |name: String, encoding: Encoding| {
+            let path = self.find(&place, &name, scene, report).ok_or(())?;
+            let key = (path, encoding);
+            if let Some(image) = self.images.get(&key) {
+                return Ok::<_, ()>(image.clone());
+            }
+            let image = load_image(&key.0, encoding).map_err(|error| {
+                let message = format!("`{name}` cannot be used as an image: {error}");
+                report.at("scene::asset", &place, message);
+            })?;
+            Ok(self.images.entry(key).or_insert(Arc::new(image)).clone())
+        };
+        texture.map_image(image).ok()
+    }
+
+    fn mesh(
+        &mut self,
+        cursor: &Cursor,
+        scene: &mut SceneDescription,
+        report: &mut Report,
+    ) -> Option<Arc<TriangleMesh>> {
+        match decode(cursor, report)? {
+            MeshFile::Triangles { positions, triangles, normals, uvs } => {
+                surface::check_triangles(cursor, positions, &triangles, normals, uvs, report)
+                    .map(Arc::new)
+            }
+            MeshFile::File(name) => {
+                let place = cursor.nth(0);
+                let path = self.find(&place, &name, scene, report)?;
+                if let Some(mesh) = self.meshes.get(&path) {
+                    return Some(mesh.clone());
+                }
+                let mesh = load_mesh(&path).map_err(|error| {
+                    let message = format!("`{name}` cannot be used as a mesh: {error}");
+                    report.at("scene::asset", &place, message);
+                });
+                let mesh = Arc::new(mesh.ok()?);
+                self.hash_mesh(&mesh);
+                Some(self.meshes.entry(path).or_insert(mesh).clone())
+            }
+        }
+    }
+
+    /// A mesh file may keep its vertices in another file: what was read from it counts as well.
+    fn hash_mesh(&mut self, mesh: &TriangleMesh) {
+        self.hash.add("positions", bytemuck::cast_slice(&mesh.positions));
+        self.hash.add("normals", bytemuck::cast_slice(&mesh.normals));
+        self.hash.add("uvs", bytemuck::cast_slice(&mesh.uvs));
+        self.hash.add("triangles", bytemuck::cast_slice(&mesh.triangles));
+    }
+}

@@ -1,0 +1,130 @@
+//! Finding the files which a scene names, and nothing else.
+//!
+//! A name is looked for beside the scene file which uses it, then in `assets/` beside that file and
+//! beside its folder, then in the asset folders of the job. What is found must, with all
+//! links followed, lie inside one of these folders, unless the job allows more.
+
+use super::LoadOptions;
+use std::path::{Path, PathBuf};
+
+/// Greatest size of a scene file in bytes. Larger things belong into mesh and image files.
+pub(super) const MAX_SCENE_BYTES: u64 = 8 << 20;
+/// Greatest size of an image or mesh file in bytes.
+pub(super) const MAX_ASSET_BYTES: u64 = 2 << 30;
+
+/// Why a file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum FileError {
+    #[error("the file `{name}` does not exist")]
+    Missing { name: String, near: Option<String> },
+    #[error("the file `{name}` lies outside the folders which this scene may read")]
+    Outside { name: String },
+    #[error("`{name}` is not a regular file")]
+    NotAFile { name: String },
+    #[error("the file `{name}` has {bytes} bytes, more than the {limit} allowed")]
+    TooLarge { name: String, bytes: u64, limit: u64 },
+    #[error("the file `{name}` cannot be read: {source}")]
+    Unreadable { name: String, source: std::io::Error },
+}
+
+impl FileError {
+    pub(super) fn code(&self) -> &'static str {
+        match self {
+            Self::Missing { .. } => "scene::missing-file",
+            Self::Outside { .. } => "scene::outside",
+            Self::NotAFile { .. } => "scene::not-a-file",
+            Self::TooLarge { .. } => "scene::too-large",
+            Self::Unreadable { .. } => "scene::unreadable",
+        }
+    }
+
+    pub(super) fn help(&self) -> Option<String> {
+        match self {
+            Self::Missing { near: Some(near), .. } => Some(format!("did you mean `{near}`?")),
+            Self::Missing { .. } => Some(
+                "files are looked for beside the scene, in `assets/` beside it or beside its \
+                 folder, and in the asset folders of the command line"
+                    .to_owned(),
+            ),
+            Self::Outside { .. } => {
+                Some("name its folder as an asset folder, or allow files from outside".to_owned())
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The folders in which files named by a scene file in `dir` may lie, first choice first.
+fn roots(dir: Option<&Path>, options: &LoadOptions) -> Vec<PathBuf> {
+    let mut roots = Vec::new();
+    if let Some(dir) = dir {
+        roots.push(dir.to_owned());
+        roots.push(dir.join("assets"));
+        // `..` of a relative folder is found by the system, links included.
+        roots.push(dir.join("..").join("assets"));
+    }
+    roots.extend(options.asset_dirs.iter().cloned());
+    roots
+}
+
+/// Finds the file `name`, checks that it may be read and that it is small enough.
+pub(super) fn find(
+    name: &str,
+    dir: Option<&Path>,
+    options: &LoadOptions,
+    limit: u64,
+) -> Result<PathBuf, FileError> {
+    let owned = || name.to_owned();
+    if !options.allow_outside && Path::new(name).has_root() {
+        return Err(FileError::Outside { name: owned() });
+    }
+    let roots = roots(dir, options);
+    let inside: Vec<PathBuf> = roots.iter().filter_map(|root| root.canonicalize().ok()).collect();
+    let mut outside = false;
+    for root in &roots {
+        let Ok(path) = root.join(name).canonicalize() else { continue };
+        if options.allow_outside || inside.iter().any(|root| path.starts_with(root)) {
+            check(name, &path, limit)?;
+            return Ok(path);
+        }
+        outside = true;
+    }
+    if outside {
+        return Err(FileError::Outside { name: owned() });
+    }
+    Err(FileError::Missing { name: owned(), near: near(name, &roots) })
+}
+
+/// Checks that a path leads to a file of at most `limit` bytes.
+pub(super) fn check(name: &str, path: &Path, limit: u64) -> Result<(), FileError> {
+    let name = name.to_owned();
+    match path.metadata() {
+        Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
+            Err(FileError::Missing { name, near: None })
+        }
+        Err(source) => Err(FileError::Unreadable { name, source }),
+        Ok(about) if !about.is_file() => Err(FileError::NotAFile { name }),
+        Ok(about) if about.len() > limit => {
+            Err(FileError::TooLarge { name, bytes: about.len(), limit })
+        }
+        Ok(_) => Ok(()),
+    }
+}
+
+/// A file in the folders whose name is like the one looked for.
+fn near(name: &str, roots: &[PathBuf]) -> Option<String> {
+    let wanted = Path::new(name);
+    let folder = wanted.parent().unwrap_or(Path::new(""));
+    if folder.components().any(|part| part == std::path::Component::ParentDir) {
+        return None;
+    }
+    // A folder of many thousands of files is not searched to its end for a hint.
+    let names: Vec<String> = roots
+        .iter()
+        .filter_map(|root| root.join(folder).read_dir().ok())
+        .flat_map(|entries| entries.take(4096).filter_map(Result::ok))
+        .filter_map(|entry| folder.join(entry.file_name()).to_str().map(str::to_owned))
+        .collect();
+    crate::description::diagnostic::nearest(name, names.iter().map(String::as_str))
+        .map(str::to_owned)
+}

@@ -1,0 +1,172 @@
+//! The ranges of all numbers in a scene file.
+//!
+//! They are wide: a range ends where a number has no physical meaning, or where 32-bit floating
+//! point can no longer hold its square. Each message tells the range.
+
+use super::decode::Report;
+use super::outline::Kind;
+use super::source::Cursor;
+use std::fmt;
+
+/// An interval of numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    min: f64,
+    max: f64,
+    open_min: bool,
+    open_max: bool,
+    unit: &'static str,
+}
+
+const fn closed(min: f64, max: f64, unit: &'static str) -> Limits {
+    Limits { min, max, open_min: false, open_max: false, unit }
+}
+
+/// Coordinates, speeds, accelerations: a tenth of a light year is far enough.
+pub(super) const COORDINATE: Limits = closed(-1e15, 1e15, "metres");
+/// Speeds.
+pub(super) const SPEED: Limits = closed(-1e15, 1e15, "metres per second");
+/// Accelerations.
+pub(super) const ACCELERATION: Limits = closed(-1e15, 1e15, "metres per second squared");
+/// Sizes of things, from a hundredth of an atom on.
+pub(super) const LENGTH: Limits = closed(1e-12, 1e15, "metres");
+/// Lengths which may be zero.
+pub(super) const LENGTH_OR_ZERO: Limits = closed(0.0, 1e15, "metres");
+/// Angles which may be many turns.
+pub(super) const ANGLE: Limits = closed(-1e9, 1e9, "degrees");
+/// Factors along an axis.
+pub(super) const SCALE: Limits = closed(-1e12, 1e12, "");
+/// Directions; only their direction counts.
+pub(super) const DIRECTION: Limits = closed(-1e15, 1e15, "");
+/// Times of keys.
+pub(super) const TIME: Limits = closed(-1e9, 1e9, "seconds");
+/// Vertical field of view.
+pub(super) const FOV: Limits =
+    Limits { min: 0.0, max: 180.0, open_min: true, open_max: true, unit: "degrees" };
+/// Shares: albedo, roughness, opacity.
+pub(super) const SHARE: Limits = closed(0.0, 1.0, "");
+/// Transmittance, of which the logarithm is taken.
+pub(super) const TRANSMITTANCE: Limits =
+    Limits { min: 0.0, max: 1.0, open_min: true, open_max: false, unit: "" };
+/// Index of refraction of a clear medium relative to vacuum.
+pub(super) const IOR: Limits = closed(1.0, 10.0, "");
+/// Real and imaginary part of a metal's index of refraction.
+pub(super) const METAL_INDEX: Limits = closed(0.0, 1000.0, "");
+/// Radiance, intensity, flux: their squares fit into `f32`.
+pub(super) const STRENGTH: Limits = closed(0.0, 1e18, "");
+/// Half angle of a cone.
+pub(super) const CONE: Limits =
+    Limits { min: 0.0, max: 180.0, open_min: true, open_max: false, unit: "degrees" };
+/// Angular diameter of a distant light.
+pub(super) const DIAMETER: Limits =
+    Limits { min: 0.0, max: 180.0, open_min: false, open_max: true, unit: "degrees" };
+/// Ratio of focal length and diameter of a lens.
+pub(super) const F_NUMBER: Limits = closed(1e-3, 1e6, "");
+/// Blades of a diaphragm, if it is not round.
+pub(super) const BLADES: Limits = closed(3.0, 64.0, "blades (or 0 for a round aperture)");
+/// Frames per second.
+pub(super) const FPS: Limits =
+    Limits { min: 0.0, max: 1e9, open_min: true, open_max: false, unit: "frames per second" };
+/// Numbers of frames; they have a place of their own in file names.
+pub(super) const FRAME: Limits = closed(0.0, 99_999_999.0, "");
+/// When the shutter opens and closes.
+pub(super) const SHUTTER: Limits = closed(-1e6, 1e6, "frames");
+/// Pixels along one side.
+pub(super) const PIXELS: Limits = closed(1.0, 65_536.0, "pixels");
+/// Pixels of a picture: what a film of about 100 bytes a pixel could fill on a large machine.
+pub(super) const AREA: Limits = closed(1.0, 268_435_456.0, "pixels in all");
+/// Samples per pixel.
+pub(super) const SAMPLES: Limits = closed(1.0, 1e9, "samples");
+/// Interactions of a path.
+pub(super) const DEPTH: Limits = closed(1.0, 1e6, "interactions");
+/// Interactions before Russian roulette.
+pub(super) const ROULETTE: Limits = closed(0.0, 1e6, "interactions");
+/// Anything above zero.
+pub(super) const POSITIVE: Limits =
+    Limits { min: 0.0, max: 1e18, open_min: true, open_max: false, unit: "" };
+/// Exposure.
+pub(super) const STOPS: Limits = closed(-60.0, 60.0, "stops");
+/// Radius and width of the pixel filter.
+pub(super) const FILTER: Limits =
+    Limits { min: 0.0, max: 16.0, open_min: true, open_max: false, unit: "pixels" };
+/// Motion tolerance.
+pub(super) const TOLERANCE: Limits =
+    Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "pixels" };
+/// Edge of a checker's field.
+pub(super) const UV_LENGTH: Limits = closed(1e-9, 1e15, "in units of uv");
+/// Texture coordinates.
+pub(super) const UV: Limits = closed(-1e9, 1e9, "");
+
+impl Limits {
+    fn contain(&self, value: f64) -> bool {
+        let above = if self.open_min { value > self.min } else { value >= self.min };
+        let below = if self.open_max { value < self.max } else { value <= self.max };
+        above && below
+    }
+}
+
+impl fmt::Display for Limits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = |x: f64| {
+            if x != 0.0 && !(1e-3..1e9).contains(&x.abs()) {
+                format!("{x:e}")
+            } else {
+                x.to_string()
+            }
+        };
+        let more = if self.open_min { "greater than" } else { "at least" };
+        let less = if self.open_max { "less than" } else { "at most" };
+        write!(f, "{more} {} and {less} {}", number(self.min), number(self.max))?;
+        if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
+    }
+}
+
+/// Reports a number outside its limits.
+pub(super) fn number(
+    report: &mut Report,
+    cursor: &Cursor,
+    value: impl Into<f64>,
+    limits: &Limits,
+) -> bool {
+    let value = value.into();
+    if limits.contain(value) {
+        return true;
+    }
+    let name = cursor.path.rsplit('.').find(|step| !step.bytes().all(|b| b.is_ascii_digit()));
+    let name = name.unwrap_or_default();
+    let (code, found) = if value.is_finite() {
+        // As written, for 0.9 is not the same in 32 bits.
+        let is_word = cursor.node.kind == Kind::Word;
+        ("scene::out-of-range", if is_word { cursor.text().to_owned() } else { value.to_string() })
+    } else {
+        ("scene::not-finite", "not a finite number".to_owned())
+    };
+    report.at(code, cursor, format!("`{name}` must be {limits}, but is {found}"));
+    false
+}
+
+/// Reports the components of a vector outside their limits, each at its own place.
+pub(super) fn vector(
+    report: &mut Report,
+    cursor: &Cursor,
+    values: &[f64],
+    limits: &Limits,
+) -> bool {
+    let mut fine = true;
+    for (index, &value) in values.iter().enumerate() {
+        let single = cursor.node.entries.len() != values.len();
+        let place = if single { cursor.clone() } else { cursor.nth(index) };
+        fine &= number(report, &place, value, limits);
+    }
+    fine
+}
+
+/// [`vector`] for colours.
+pub(super) fn color(
+    report: &mut Report,
+    cursor: &Cursor,
+    color: crate::description::Rgb,
+    limits: &Limits,
+) -> bool {
+    vector(report, cursor, &color.to_array().map(f64::from), limits)
+}

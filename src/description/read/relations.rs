@@ -1,0 +1,174 @@
+//! What only shows when all definitions are known: cycles, the camera, colours of textures.
+
+use super::decode::Report;
+use super::source::Cursor;
+use super::surface::reference;
+use super::{LoadOptions, Names};
+use crate::description::diagnostic::{Diagnostic, Severity, suggestion};
+use crate::description::{Material, SceneDescription, Texture, Value};
+use indexmap::IndexMap;
+
+/// Reports entities which are their own ancestors, and materials made of themselves.
+pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
+    let parents: IndexMap<&str, Vec<(&str, &str)>> = scene
+        .entities
+        .iter()
+        .map(|(name, entity)| {
+            (
+                name.as_str(),
+                entity.parent.iter().map(|parent| ("parent", parent.as_str())).collect(),
+            )
+        })
+        .collect();
+    for (name, field, path) in cycles(&parents) {
+        let message = format!("`{name}` is its own ancestor: {path}");
+        report.at("scene::cycle", &names.entities[name].at(field), message);
+    }
+    let parts: IndexMap<&str, Vec<(&str, &str)>> = scene
+        .materials
+        .iter()
+        .map(|(name, material)| {
+            let parts = match material {
+                Material::Mix { a, b, .. } => vec![("a", a.as_str()), ("b", b.as_str())],
+                Material::Masked { material, .. } => vec![("material", material.as_str())],
+                _ => Vec::new(),
+            };
+            (name.as_str(), parts)
+        })
+        .collect();
+    for (name, field, path) in cycles(&parts) {
+        let message = format!("the material `{name}` is made of itself: {path}");
+        report.at("scene::cycle", &names.materials[name].at(field), message);
+    }
+}
+
+/// The cycles of a graph, each once: the node and edge that close it, and the way around.
+fn cycles<'a>(
+    edges: &IndexMap<&'a str, Vec<(&'a str, &'a str)>>,
+) -> Vec<(&'a str, &'a str, String)> {
+    let mut found = Vec::new();
+    let mut done = vec![false; edges.len()];
+    for start in 0..edges.len() {
+        // Depth first, without recursion: a chain of parents may be long.
+        let mut way: Vec<(usize, usize)> = Vec::new();
+        let mut on_way = vec![false; if done[start] { 0 } else { edges.len() }];
+        if !done[start] {
+            way.push((start, 0));
+            on_way[start] = true;
+        }
+        while let Some((node, next)) = way.last_mut() {
+            let (name, targets) = edges.get_index(*node).expect("it came from the map");
+            let Some((field, target)) = targets.get(*next) else {
+                done[*node] = true;
+                on_way[*node] = false;
+                way.pop();
+                continue;
+            };
+            *next += 1;
+            let Some(target) = edges.get_index_of(target) else { continue };
+            if on_way[target] {
+                let from = way.iter().position(|(node, _)| *node == target).unwrap_or(0);
+                let label =
+                    |node: usize| format!("`{}`", edges.get_index(node).map_or("", |e| e.0));
+                let around: Vec<_> = way[from..].iter().map(|(node, _)| label(*node)).collect();
+                found.push((*name, *field, format!("{} → {}", around.join(" → "), label(target))));
+            } else if !done[target] {
+                on_way[target] = true;
+                way.push((target, 0));
+            }
+        }
+    }
+    found
+}
+
+/// Finds the camera to look through: the one asked for, the one the scene names, the only one.
+pub(super) fn choose_camera(
+    scene: &mut SceneDescription,
+    chosen: Option<&Cursor>,
+    names: &Names,
+    options: &LoadOptions,
+    report: &mut Report,
+) {
+    // Whether an entity has a camera is asked of the text: one that is wrong is a camera, too.
+    let cameras: Vec<(&str, Cursor)> = names
+        .entities
+        .iter()
+        .filter_map(|(name, entity)| Some((name.as_str(), entity.field("camera")?)))
+        .collect();
+    let available = || cameras.iter().map(|(name, _)| *name);
+    if let Some(name) = &options.camera {
+        if available().any(|camera| camera == name) {
+            scene.camera.clone_from(name);
+        } else {
+            report.found.0.push(Diagnostic {
+                severity: Severity::Error,
+                code: "scene::camera",
+                message: format!("there is no camera named `{name}`"),
+                place: None,
+                label: String::new(),
+                related: Vec::new(),
+                help: suggestion(name, available(), "cameras"),
+            });
+        }
+        return;
+    }
+    if let Some(cursor) = chosen {
+        let Some(name) = super::decode::decode::<String>(cursor, report) else { return };
+        if available().any(|camera| camera == name) {
+            scene.camera = name;
+        } else if names.entities.contains_key(&name) {
+            let message = format!("the entity `{name}` has no camera");
+            report.at("scene::camera", cursor, message).help =
+                suggestion(&name, available(), "cameras");
+        } else {
+            reference(report, cursor, &name, &names.entities, "entity", "entities");
+        }
+        return;
+    }
+    match cameras.as_slice() {
+        [(name, _)] => (*name).clone_into(&mut scene.camera),
+        [] => {
+            report.found.0.push(Diagnostic {
+                severity: Severity::Error,
+                code: "scene::camera",
+                message: "the scene has no camera".to_owned(),
+                place: None,
+                label: String::new(),
+                related: Vec::new(),
+                help: Some(
+                    "add an entity such as \"camera\": (transform: (translation: (0, 1, 5)), \
+                     camera: ())"
+                        .to_owned(),
+                ),
+            });
+        }
+        [(first, at), (_, other), ..] => {
+            let message = format!("the scene has {} cameras and chooses none", cameras.len());
+            let diagnostic = report.error("scene::camera", at.key_place(), &at.path, message);
+            diagnostic.related.push((other.key_place(), other.path.clone()));
+            diagnostic.help = Some(format!("choose one, as in `camera: \"{first}\"`"));
+        }
+    }
+}
+
+/// Reports procedural textures which reflect more light than there is. Colours are only known as
+/// shares where they are used, for the same texture may give radiance elsewhere.
+pub(super) fn check_shares(scene: &SceneDescription, names: &Names, report: &mut Report) {
+    for (name, material) in &scene.materials {
+        let colors = match material {
+            Material::Diffuse { albedo } | Material::Plastic { albedo, .. } => ("albedo", albedo),
+            Material::Mirror { reflectance } => ("reflectance", reflectance),
+            Material::ThinGlass { tint, .. } => ("tint", tint),
+            Material::Conductor { f0: Some(f0), .. } => ("f0", f0),
+            Material::Principled { base_color, .. } => ("base_color", base_color),
+            _ => continue,
+        };
+        let (field, Value::Texture(texture)) = colors else { continue };
+        let Some(Texture::Checker { a, b, .. }) = scene.textures.get(texture) else { continue };
+        if a.max_element() > 1.0 || b.max_element() > 1.0 {
+            let message =
+                format!("`{field}` must be at most 1, but the texture `{texture}` goes beyond");
+            report.at("scene::out-of-range", &names.materials[name].at(field), message);
+        }
+    }
+}
