@@ -1,10 +1,23 @@
-//! The stages of one frame, in order.
+//! The stages of one frame, and [`Simulation`], which runs them.
 
-use crate::film::Film;
+use crate::build::bvh::{MeshTrees, TopLevel};
+use crate::build::light::LightTable;
+use crate::description::{IntegratorChoice, SceneDescription};
+use crate::extract::{Instances, Requirements, ViewCamera};
+use crate::film::{Film, FilmError};
+use crate::integrate::IntegrateStatus;
+use crate::world::{Camera, FrameClock, Settings};
+use crate::{build, extract, integrate, step};
 use bevy_ecs::prelude::*;
+use bevy_ecs::schedule::{
+    IntoScheduleConfigs, LogLevel, ScheduleBuildSettings, SingleThreadedExecutor,
+};
+use bevy_ecs::system::ScheduleSystem;
 use serde::Serialize;
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::time::Instant;
 
 /// The stages of one frame, in order. A stage reads only what earlier stages wrote.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,7 +35,7 @@ pub enum FrameSystems {
 /// How a caller watches and stops a render. Cheap to clone; every clone is the same control.
 #[derive(Clone, Debug, Default, Resource)]
 pub struct RenderControl {
-    /// Set to true to stop: the frame being rendered is given up at the next tile.
+    /// Set to true to stop: the frame being rendered is given up.
     pub cancel: Arc<AtomicBool>,
     /// Pixel samples finished in the current frame.
     pub samples_done: Arc<AtomicU64>,
@@ -39,7 +52,7 @@ pub struct FrameReport {
     pub frame: u32,
     /// Seconds spent in each stage, in order: `step`, `extract`, `build`, `integrate`.
     pub stage_seconds: Vec<(&'static str, f64)>,
-    /// What was rebuilt, in words: `"instances: 3 of 10"`, `"top level"`, `"mesh rabbit"`.
+    /// What was rebuilt, in words: `"instances: 3 of 10"`, `"top level"`, `"meshes: 1"`.
     pub rebuilt: Vec<String>,
     /// Pixel samples taken.
     pub samples: u64,
@@ -64,4 +77,248 @@ pub struct RenderedFrame {
     pub report: FrameReport,
     /// World to camera at shutter opening, column-major, for the EXR header.
     pub world_to_camera: glam::DMat4,
+}
+
+/// Why a frame could not be rendered.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The control's `cancel` was set.
+    #[error("the render was cancelled")]
+    Cancelled,
+    /// There is nothing to look through.
+    #[error("the world has no entity with a `Camera`: spawn one")]
+    NoCamera,
+    /// A component refers to an entity which is not what it should be.
+    #[error("{0}")]
+    Dangling(String),
+    /// The picture cannot be made.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// The shutter closes before it opens, or the rate is not positive.
+    #[error("the clock cannot run: {0}")]
+    Clock(String),
+}
+
+/// A world and the schedule which makes a frame of it.
+pub struct Simulation {
+    world: World,
+    schedule: Schedule,
+}
+
+/// When a stage began, written by the marker systems between the stages.
+#[derive(Resource, Default)]
+struct StageClock(Vec<Instant>);
+
+fn mark(mut clock: ResMut<StageClock>) {
+    clock.0.push(Instant::now());
+}
+
+/// Markers before the first stage and after each one.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Marks {
+    Opening,
+    Stepped,
+    Extracted,
+    Built,
+    Integrated,
+}
+
+impl Default for Simulation {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Simulation {
+    /// An empty world with the default clock and settings.
+    pub fn new() -> Self {
+        let mut world = World::new();
+        world.insert_resource(FrameClock::default());
+        world.insert_resource(Settings::default());
+        world.insert_resource(RenderControl::default());
+        world.insert_resource(StageClock::default());
+        let schedule = frame_schedule(&mut world);
+        Self { world, schedule }
+    }
+
+    /// The world of a description.
+    pub fn from_description(scene: &SceneDescription) -> Self {
+        let mut simulation = Self::new();
+        crate::world::spawn_scene(&mut simulation.world, scene);
+        simulation
+    }
+
+    /// The world.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The world, to spawn entities into and to change resources.
+    pub fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// Adds systems which move things: they run before velocities and keyframes are applied, once
+    /// for every sample of the shutter, and must be pure functions of
+    /// [`SceneTime`](crate::world::SceneTime).
+    pub fn add_step_systems<M>(
+        &mut self,
+        systems: impl IntoScheduleConfigs<ScheduleSystem, M>,
+    ) -> &mut Self {
+        self.world.schedule_scope(step::Pose, |_, poses| {
+            poses.add_systems(systems.in_set(step::PoseSystems::Custom));
+        });
+        self
+    }
+
+    /// Runs all stages but the last for a frame: afterwards the tables of the frame stand in the
+    /// world's resources.
+    ///
+    /// # Errors
+    /// When there is no camera, a reference dangles or the clock cannot run.
+    pub fn prepare_frame(&mut self, frame: u32) -> Result<(), RenderError> {
+        let samples = std::mem::take(&mut self.world.resource_mut::<Settings>().0.samples);
+        let size = std::mem::replace(&mut self.world.resource_mut::<Settings>().0.size, (1, 1));
+        let outcome = self.run(frame, &RenderControl::default());
+        let mut settings = self.world.resource_mut::<Settings>();
+        (settings.0.samples, settings.0.size) = (samples, size);
+        outcome.map(|_| ())
+    }
+
+    /// Renders a frame.
+    ///
+    /// The result depends on the world and the frame alone: not on the frames rendered before, and not
+    /// on the number of threads.
+    ///
+    /// # Errors
+    /// When the control cancels it, there is no camera, a reference dangles, the clock cannot run
+    /// or there is no memory for the film.
+    pub fn render_frame(
+        &mut self,
+        frame: u32,
+        control: &RenderControl,
+    ) -> Result<RenderedFrame, RenderError> {
+        self.run(frame, control)
+    }
+
+    fn run(&mut self, frame: u32, control: &RenderControl) -> Result<RenderedFrame, RenderError> {
+        self.check_clock()?;
+        if self.world.query::<&Camera>().iter(&self.world).next().is_none() {
+            return Err(RenderError::NoCamera);
+        }
+        let settings = &self.world.resource::<Settings>().0;
+        let pixels = u64::from(settings.size.0) * u64::from(settings.size.1);
+        let total = pixels * u64::from(settings.samples);
+        control.samples_done.store(0, Relaxed);
+        control.samples_total.store(total, Relaxed);
+        control.rays.store(0, Relaxed);
+        self.world.insert_resource(control.clone());
+        self.world.resource_mut::<FrameClock>().frame = frame;
+        self.world.resource_mut::<StageClock>().0.clear();
+        self.schedule.run(&mut self.world);
+        self.world.clear_trackers();
+        let mut status = self.world.resource_mut::<IntegrateStatus>();
+        let status = std::mem::take(&mut *status);
+        if let Some(error) = status.error {
+            return Err(error.into());
+        }
+        let film = status.film.ok_or(RenderError::Cancelled)?;
+        let report = FrameReport {
+            frame,
+            stage_seconds: self.stage_seconds(),
+            rebuilt: self.rebuilt(),
+            samples: total,
+            rays: status.counters.rays,
+            non_finite: film.non_finite(),
+            truncated_paths: status.counters.truncated,
+            integrator: self.integrator(),
+            warnings: self.warnings(&film),
+        };
+        let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
+        Ok(RenderedFrame { film, report, world_to_camera })
+    }
+
+    fn check_clock(&self) -> Result<(), RenderError> {
+        let clock = self.world.resource::<FrameClock>().clock;
+        let (open, close) = clock.shutter;
+        if !(clock.fps > 0.0 && clock.fps.is_finite()) {
+            return Err(RenderError::Clock(format!("{} frames per second", clock.fps)));
+        }
+        if !(open.is_finite() && close.is_finite() && open <= close) {
+            return Err(RenderError::Clock(format!("the shutter opens at {open} and closes at {close}")));
+        }
+        Ok(())
+    }
+
+    fn stage_seconds(&self) -> Vec<(&'static str, f64)> {
+        let marks = &self.world.resource::<StageClock>().0;
+        ["step", "extract", "build", "integrate"]
+            .into_iter()
+            .zip(marks.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()))
+            .collect()
+    }
+
+    fn rebuilt(&self) -> Vec<String> {
+        let mut rebuilt = Vec::new();
+        let instances = self.world.resource::<Instances>();
+        if instances.rewritten > 0 {
+            rebuilt.push(format!("instances: {} of {}", instances.rewritten, instances.list.len()));
+        }
+        let meshes = self.world.resource::<MeshTrees>();
+        if meshes.built > 0 {
+            rebuilt.push(format!("mesh trees: {} of {}", meshes.built, meshes.list.len()));
+        }
+        if self.world.resource::<TopLevel>().built {
+            rebuilt.push("top level".to_owned());
+        }
+        let lights = self.world.resource::<LightTable>();
+        if lights.built {
+            rebuilt.push(format!("lights: {}", lights.len()));
+        }
+        rebuilt
+    }
+
+    fn integrator(&self) -> String {
+        match self.world.resource::<Settings>().0.integrator {
+            IntegratorChoice::Path => "Path".to_owned(),
+            IntegratorChoice::Auto => "Path (Auto: the only integrator so far)".to_owned(),
+        }
+    }
+
+    fn warnings(&self, film: &Film) -> Vec<String> {
+        let mut warnings = self.world.resource::<Requirements>().warnings.clone();
+        warnings.extend(self.world.resource::<ViewCamera>().warning.clone());
+        if self.world.resource::<LightTable>().is_empty() {
+            warnings.push(
+                "the scene has no light: give an entity an `emission` or a `light`".to_owned(),
+            );
+        }
+        if film.non_finite() > 0 {
+            warnings.push(format!(
+                "{} samples were not finite numbers and were left out",
+                film.non_finite()
+            ));
+        }
+        warnings
+    }
+}
+
+/// Builds the frame schedule; every stage installs its own systems and resources.
+fn frame_schedule(world: &mut World) -> Schedule {
+    use FrameSystems::{Build, Extract, Integrate, Step};
+    let mut frame = Schedule::default();
+    frame.set_executor(SingleThreadedExecutor::new());
+    let ambiguity_detection = LogLevel::Error;
+    frame.set_build_settings(ScheduleBuildSettings { ambiguity_detection, ..Default::default() });
+    frame.configure_sets((Marks::Opening, Step, Marks::Stepped, Extract).chain());
+    frame.configure_sets((Extract, Marks::Extracted, Build, Marks::Built).chain());
+    frame.configure_sets((Marks::Built, Integrate, Marks::Integrated).chain());
+    for set in [Marks::Opening, Marks::Stepped, Marks::Extracted, Marks::Built, Marks::Integrated] {
+        frame.add_systems(mark.in_set(set));
+    }
+    step::install(world, &mut frame);
+    extract::install(world, &mut frame);
+    build::install(world, &mut frame);
+    integrate::install(world, &mut frame);
+    frame
 }

@@ -1,0 +1,387 @@
+//! Unidirectional path tracing.
+//!
+//! A path is followed from the camera. At every surface it takes what the surface emits, connects to
+//! one point of one light (next-event estimation), and goes on in a direction drawn from the BSDF:
+//!
+//! ```text
+//! L = Σₖ βₖ·(w·Lₑ + NEE),      βₖ₊₁ = βₖ·f·|cos θ|/p
+//! ```
+//!
+//! (Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed., sections 13.2 to 13.4.) Light
+//! which both techniques can find is weighted by the power heuristic; what only one can find (lights
+//! and lobes without extent) has weight 1 there. Paths end by Russian roulette on their throughput,
+//! the scale `η²` of refraction taken out of it: the survivors are divided by the probability to
+//! survive, which keeps the mean.
+//!
+//! Which side of a surface a direction leaves by is decided by the geometric normal. The shading
+//! normal shapes the BSDF; a specular direction which ends up on the wrong side is drawn again around
+//! the geometric normal, any other is dropped.
+
+use super::SceneView;
+use crate::build::bvh::{Hit, SurfacePoint};
+use crate::build::light::Receiver;
+use crate::description::Rgb;
+use crate::extract::{CameraRay, NOTHING};
+use crate::film::{FirstHit, PixelSample};
+use crate::math::{Frame, Ray, offset_ray_origin};
+use crate::sampling::{Sampler, dimension, power_heuristic};
+use crate::shade::{Bsdf, BsdfSample, TransportMode};
+use glam::{DVec3, Vec2, Vec3};
+
+/// The path tracer with its settings.
+///
+/// `OPACITY` and `ABSORPTION` say whether the scene requires surfaces with holes and solids which
+/// absorb; without them there is no code for them on the path.
+#[derive(Clone, Copy)]
+pub struct PathTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
+    /// The scene.
+    pub scene: SceneView<'a>,
+    /// Greatest number of surface interactions.
+    pub max_depth: u32,
+    /// Interactions before roulette may end a path.
+    pub roulette_depth: u32,
+    /// Upper limit of a sample's radiance after its first bounce.
+    pub clamp_indirect: Option<f32>,
+    /// Whether the film wants to know what the camera ray met first.
+    pub wants_first_hit: bool,
+    /// World position of the origin of render space.
+    pub origin: DVec3,
+}
+
+/// What happened on the paths of one tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PathCounters {
+    /// Rays traced, shadow rays included.
+    pub rays: u64,
+    /// Paths which were cut off at the greatest depth although they still carried something.
+    pub truncated: u64,
+}
+
+impl PathCounters {
+    /// The sum of both.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self { rays: self.rays + other.rays, truncated: self.truncated + other.truncated }
+    }
+}
+
+/// How the path arrived where it is: what the weight of an emitter found there depends on.
+#[derive(Clone, Copy)]
+enum Arrival {
+    /// From the camera or over a lobe without extent: no light sample could have found it.
+    Sure,
+    /// In a direction of this density from this receiver.
+    Drawn { from: Receiver, pdf: f32 },
+}
+
+/// A point on a path.
+struct Vertex<'a> {
+    surface: SurfacePoint,
+    frame: Frame,
+    wo: Vec3,
+    bsdf: Bsdf<'a>,
+}
+
+impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, ABSORPTION> {
+    /// The radiance which arrives along a camera ray.
+    pub fn sample(
+        &self,
+        camera_ray: &CameraRay,
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> PixelSample {
+        let mut ray = camera_ray.ray;
+        let mut radiance = Rgb::ZERO;
+        let mut throughput = Rgb::ONE;
+        // Product of the η² by which refraction has scaled the throughput so far, inverted.
+        let mut eta_scale = 1.0_f32;
+        let mut arrival = Arrival::Sure;
+        let mut first_hit = None;
+        let mut inside = NOTHING;
+        // Surface interactions, and surfaces met: those which let the ray pass count only here.
+        let mut depth = 0;
+        let mut met = 0;
+        loop {
+            counters.rays += 1;
+            let from_camera = met == 0;
+            let Some(hit) = self.scene.geometry.closest_hit(&ray, f64::INFINITY, from_camera) else {
+                let light = self.infinite(&ray, arrival);
+                radiance += self.limited(throughput * light, depth);
+                break;
+            };
+            let dimensions = dimension::vertex(met);
+            met += 1;
+            let surface = self.scene.geometry.surface(&ray, &hit);
+            let instance = &self.scene.geometry.instances[hit.instance as usize];
+            let materials = &self.scene.surfaces.materials;
+            let wo = -ray.d;
+            if OPACITY && instance.material != NOTHING {
+                let opacity = materials.opacity(instance.material, surface.uv);
+                let passes = opacity < 1.0
+                    && sampler.one(dimensions + dimension::ROULETTE) >= opacity;
+                if passes {
+                    ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                    continue;
+                }
+            }
+            if ABSORPTION && inside != NOTHING {
+                throughput *= self.transmittance(inside, hit.t);
+            }
+            let emitted = self.emitted(&hit, &surface, wo, ray.time, arrival);
+            radiance += self.limited(throughput * emitted, depth);
+
+            let mut lobe = sampler.one(dimensions + dimension::LOBE);
+            let bsdf = (instance.material != NOTHING)
+                .then(|| materials.bsdf(instance.material, surface.uv, &mut lobe));
+            if self.wants_first_hit && depth == 0 && first_hit.is_none() {
+                first_hit = Some(self.first_hit(camera_ray, &ray, &hit, &surface, bsdf.as_ref()));
+            }
+            let Some(bsdf) = bsdf else { break };
+            if depth == self.max_depth {
+                counters.truncated += 1;
+                break;
+            }
+            let vertex = Vertex::new(surface, wo, bsdf);
+            let receiver = vertex.receiver();
+            if bsdf.has_non_delta() {
+                let light = self.direct(&vertex, &receiver, sampler, dimensions, &ray, counters);
+                radiance += self.limited(throughput * light, depth);
+            }
+            let Some((wi, sample)) =
+                vertex.scatter(lobe, sampler.two(dimensions + dimension::DIRECTION))
+            else {
+                break;
+            };
+            throughput *= sample.weight;
+            depth += 1;
+            if sample.transmitted {
+                eta_scale *= sample.eta * sample.eta;
+                if ABSORPTION && materials.is_dielectric(instance.material) {
+                    let entering = wi.dot(vertex.surface.ng) < 0.0;
+                    inside = if entering { instance.material } else { NOTHING };
+                }
+            }
+            if depth >= self.roulette_depth {
+                let survival = (throughput * eta_scale).max_element().min(1.0);
+                let u = sampler.one(dimensions + dimension::ROULETTE);
+                // The negation also ends a path whose throughput is NaN.
+                if !(u < survival) {
+                    break;
+                }
+                throughput /= survival;
+            }
+            let surface = &vertex.surface;
+            ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
+            ray.d = wi;
+            arrival = if sample.delta {
+                Arrival::Sure
+            } else {
+                Arrival::Drawn { from: receiver, pdf: sample.pdf }
+            };
+        }
+        PixelSample { radiance, first_hit }
+    }
+
+    /// Light from infinitely far away along a ray which meets nothing.
+    fn infinite(&self, ray: &Ray, arrival: Arrival) -> Rgb {
+        let (from, pdf) = match &arrival {
+            Arrival::Sure => (None, None),
+            Arrival::Drawn { from, pdf } => (Some(from), Some(*pdf)),
+        };
+        self.scene
+            .lights
+            .infinite(from, ray.d, ray.time)
+            .map(|(radiance, light_pdf)| match pdf {
+                None => radiance,
+                Some(pdf) => radiance * power_heuristic(pdf, light_pdf),
+            })
+            .fold(Rgb::ZERO, |sum, radiance| sum + radiance)
+    }
+
+    /// What the surface that was met emits along the path, weighted.
+    fn emitted(
+        &self,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        wo: Vec3,
+        time: f32,
+        arrival: Arrival,
+    ) -> Rgb {
+        let lights = &self.scene.lights;
+        let radiance = lights.emitted(hit.instance, surface, wo);
+        match arrival {
+            Arrival::Drawn { from, pdf } if radiance != Rgb::ZERO => {
+                let light_pdf = lights.pdf(
+                    &from,
+                    hit.instance,
+                    hit.primitive,
+                    surface.p,
+                    surface.ng,
+                    time,
+                );
+                radiance * power_heuristic(pdf, light_pdf)
+            }
+            _ => radiance,
+        }
+    }
+
+    /// Light which arrives straight from a light, by one connection.
+    fn direct(
+        &self,
+        vertex: &Vertex,
+        receiver: &Receiver,
+        sampler: &Sampler,
+        dimensions: u32,
+        ray: &Ray,
+        counters: &mut PathCounters,
+    ) -> Rgb {
+        let choose = sampler.one(dimensions + dimension::LIGHT);
+        let on_light = sampler.two(dimensions + dimension::LIGHT_POINT);
+        let Some(light) = self.scene.lights.sample(receiver, ray.time, choose, on_light) else {
+            return Rgb::ZERO;
+        };
+        let value = vertex.evaluate(light.wi);
+        if value.0 == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        let (shadow_ray, end) = light.shadow_ray(receiver, ray.time);
+        counters.rays += 1;
+        let visible = self.visible(&shadow_ray, end);
+        if visible == 0.0 {
+            return Rgb::ZERO;
+        }
+        let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, value.1) };
+        value.0 * light.radiance * (visible * weight / light.pdf)
+    }
+
+    /// Share of the light which passes along a segment.
+    fn visible(&self, shadow_ray: &Ray, end: f64) -> f32 {
+        if !OPACITY {
+            return if self.scene.geometry.occluded(shadow_ray, end) { 0.0 } else { 1.0 };
+        }
+        // Holes let a share of the light through: follow the segment from surface to surface.
+        let mut passed = 1.0;
+        let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
+        let mut ray = *shadow_ray;
+        while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
+            let material = self.scene.geometry.instances[hit.instance as usize].material;
+            if material == NOTHING || !self.scene.surfaces.materials.has_opacity(material) {
+                return 0.0;
+            }
+            let surface = self.scene.geometry.surface(&ray, &hit);
+            passed *= 1.0 - self.scene.surfaces.materials.opacity(material, surface.uv);
+            if passed == 0.0 {
+                return 0.0;
+            }
+            ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+            if end.is_finite() {
+                ray.d = (target - ray.o.as_dvec3()).as_vec3();
+                if ray.d.dot(shadow_ray.d) <= 0.0 {
+                    break;
+                }
+            }
+        }
+        passed
+    }
+
+    /// Beer and Lambert's law inside a solid of this material over a distance in metres.
+    fn transmittance(&self, material: u32, distance: f64) -> Rgb {
+        match self.scene.surfaces.materials.attenuation(material) {
+            Some(sigma_a) => (sigma_a * -(distance as f32)).map(f32::exp),
+            None => Rgb::ONE,
+        }
+    }
+
+    /// The knob `clamp_indirect`; what the camera or its first surface sees is never limited.
+    fn limited(&self, radiance: Rgb, depth: u32) -> Rgb {
+        match self.clamp_indirect {
+            Some(limit) if depth > 0 => radiance.min(Rgb::splat(limit)),
+            _ => radiance,
+        }
+    }
+
+    fn first_hit(
+        &self,
+        camera_ray: &CameraRay,
+        ray: &Ray,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        bsdf: Option<&Bsdf>,
+    ) -> FirstHit {
+        let scene = &self.scene;
+        let normal = if surface.ns.dot(ray.d) > 0.0 { -surface.ns } else { surface.ns };
+        let camera_from_render = scene.camera.motion.inverse_at(ray.time);
+        let depth = (surface.p - camera_ray.ray.o.as_dvec3()).dot(camera_ray.axis);
+        debug_assert!(camera_from_render.is_finite());
+        let albedo = bsdf.map_or(Rgb::ZERO, |bsdf| {
+            bsdf.albedo(surface.frame().to_local(-ray.d))
+        });
+        let film = |time: f32| scene.camera.project(scene.geometry.point_at(ray, hit, time), time);
+        let motion = match (film(0.0), film(1.0)) {
+            (Some(from), Some(to)) => (to - from).as_vec2(),
+            _ => Vec2::ZERO,
+        };
+        FirstHit {
+            albedo,
+            normal,
+            depth: depth as f32,
+            position: surface.p + self.origin,
+            motion,
+            object_id: scene.geometry.instances[hit.instance as usize].object_id,
+        }
+    }
+}
+
+impl<'a> Vertex<'a> {
+    fn new(mut surface: SurfacePoint, wo: Vec3, bsdf: Bsdf<'a>) -> Self {
+        // Seen from beyond its horizon a shading normal cannot say what is reflected where.
+        if wo.dot(surface.ns) * wo.dot(surface.ng) <= 0.0 {
+            surface.ns = surface.ng;
+        }
+        Self { surface, frame: surface.frame(), wo, bsdf }
+    }
+
+    fn receiver(&self) -> Receiver {
+        let SurfacePoint { p, p_error, ng, ns, .. } = self.surface;
+        let facing = if self.wo.dot(ns) < 0.0 { -ns } else { ns };
+        Receiver { p, p_error, ng, facing }
+    }
+
+    /// Whether `wi` leaves by the side on which the BSDF placed it.
+    fn is_consistent(&self, wi: Vec3) -> bool {
+        let ng = self.surface.ng;
+        let ns = self.surface.ns;
+        let transmits = |n: Vec3| (wi.dot(n) > 0.0) != (self.wo.dot(n) > 0.0);
+        transmits(ng) == transmits(ns)
+    }
+
+    /// `f·|cos θ|` towards a light, and the density with which the BSDF draws that direction.
+    fn evaluate(&self, wi: Vec3) -> (Rgb, f32) {
+        if !self.is_consistent(wi) {
+            return (Rgb::ZERO, 0.0);
+        }
+        let (wo, wi) = (self.frame.to_local(self.wo), self.frame.to_local(wi));
+        let value = self.bsdf.evaluate(wo, wi, TransportMode::Radiance);
+        (value.f_cos, value.pdf)
+    }
+
+    /// Draws where the path goes on.
+    fn scatter(&self, lobe: f32, u: Vec2) -> Option<(Vec3, BsdfSample)> {
+        let draw = |frame: &Frame| {
+            let wo = frame.to_local(self.wo);
+            let sample = self.bsdf.sample(wo, lobe, u, TransportMode::Radiance)?;
+            Some((frame.from_local(sample.wi).normalize(), sample))
+        };
+        let (wi, sample) = draw(&self.frame)?;
+        let ng = self.surface.ng;
+        let crosses = |wi: Vec3| (wi.dot(ng) > 0.0) != (self.wo.dot(ng) > 0.0);
+        if crosses(wi) == sample.transmitted {
+            return Some((wi, sample));
+        }
+        if !sample.delta {
+            return None;
+        }
+        let (wi, sample) = draw(&Frame::from_z_and_tangent(ng, self.surface.dpdu))?;
+        (crosses(wi) == sample.transmitted).then_some((wi, sample))
+    }
+}

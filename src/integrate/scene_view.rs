@@ -1,0 +1,58 @@
+//! The tables of a frame, together, as an integrator sees them.
+
+use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
+use crate::build::light::{LightTable, Lights};
+use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
+use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemParam;
+
+/// The tables of a frame.
+#[derive(SystemParam)]
+pub struct SceneTables<'w> {
+    instances: Res<'w, Instances>,
+    meshes: Res<'w, MeshTrees>,
+    top: Res<'w, TopLevel>,
+    surfaces: Res<'w, Surfaces>,
+    lights: Res<'w, LightTable>,
+    punctual: Res<'w, PunctualLights>,
+    camera: Res<'w, ViewCamera>,
+    requirements: Res<'w, Requirements>,
+}
+
+/// The scene of a frame: arrays and indices, read-only.
+#[derive(Clone, Copy)]
+pub struct SceneView<'a> {
+    /// What rays meet.
+    pub geometry: SceneGeometry<'a>,
+    /// Materials, textures and emissions.
+    pub surfaces: &'a Surfaces,
+    /// What shines.
+    pub lights: Lights<'a>,
+    /// What looks.
+    pub camera: &'a ViewCamera,
+    /// What the scene needs.
+    pub requirements: &'a Requirements,
+}
+
+impl SceneTables<'_> {
+    /// The tables as one view.
+    pub fn view(&self) -> SceneView<'_> {
+        let geometry = SceneGeometry {
+            instances: &self.instances.list,
+            meshes: &self.meshes.list,
+            top: &self.top,
+        };
+        SceneView {
+            geometry,
+            surfaces: &self.surfaces,
+            lights: Lights {
+                table: &self.lights,
+                punctual: &self.punctual.0,
+                geometry,
+                materials: &self.surfaces.materials,
+            },
+            camera: &self.camera,
+            requirements: &self.requirements,
+        }
+    }
+}
