@@ -1,28 +1,171 @@
-//! Image and mesh files to plain data.
+//! Reads the files that a scene names: images and triangle meshes.
+//!
+//! - [`image`](load_image): PNG, JPEG, Radiance HDR, OpenEXR; known by their contents, not by name;
+//! - `obj`: Wavefront OBJ; `polygon` cuts its faces into triangles;
+//! - `gltf`: the geometry of glTF 2.0, as `.gltf` or `.glb`; `accessor` reads its numbers,
+//!   `gather` puts its parts together;
+//! - `tidy`: what every mesh must hold before a renderer may trust it.
+//!
+//! Any bytes may stand in a file. Whatever they are, the answer is a sound value or an
+//! [`AssetError`], within the limits below; never a panic.
 
-use super::{Encoding, ImageData, TriangleMesh};
-use std::path::Path;
+mod accessor;
+mod gather;
+mod gltf;
+mod image;
+mod obj;
+mod polygon;
+mod tidy;
 
-/// Why an asset file could not be read.
+pub use image::load_image;
+
+use super::TriangleMesh;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// Largest file that is read, in bytes. Larger ones are refused before any memory is taken.
+pub const MAX_FILE_BYTES: u64 = 2 << 30;
+
+/// Greatest width and height of an image, in pixels.
+pub const MAX_IMAGE_SIDE: u32 = 1 << 15;
+
+/// Greatest memory of a decoded image, in bytes.
+pub const MAX_IMAGE_BYTES: u64 = 2 << 30;
+
+/// Greatest number of triangles, and of vertices, in one mesh. Instances do not count: this bounds
+/// the memory that a small file can ask for by naming its geometry many times.
+pub const MAX_MESH_ELEMENTS: usize = 1 << 26;
+
+/// Why a file that a scene names could not be used. Messages are whole: they end with their cause.
+#[expect(missing_docs, reason = "each message names its fields")]
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
-    /// Not a format that is read.
-    #[error("this kind of file is not supported")]
-    Unsupported,
+    #[error("cannot read `{path}`: {cause}", path = .path.display())]
+    Read { path: PathBuf, cause: io::Error },
+    #[error(
+        "`{path}` is too large: {found}, where at most {limit} are allowed",
+        path = .path.display()
+    )]
+    TooLarge { path: PathBuf, found: String, limit: String },
+    #[error(
+        "`{path}` is {found}; expected {expected}",
+        path = .path.display()
+    )]
+    UnknownFormat { path: PathBuf, found: String, expected: &'static str },
+    #[error(
+        "`{path}` is not a sound image, or is cut off: {cause}",
+        path = .path.display()
+    )]
+    Image { path: PathBuf, cause: ::image::ImageError },
+    #[error(
+        "`{path}` is not a sound OpenEXR file with the channels R, G and B: {cause}",
+        path = .path.display()
+    )]
+    Exr { path: PathBuf, cause: exr::error::Error },
+    #[error("`{path}`, line {line}: {message}", path = .path.display())]
+    Obj { path: PathBuf, line: usize, message: String },
+    #[error("`{path}`: {message}", path = .path.display())]
+    Mesh { path: PathBuf, message: String },
+    #[error(
+        "`{path}` names the buffer `{uri}`, which is not a file beside it: \
+         use a relative path without `..`, or embed the buffer",
+        path = .path.display()
+    )]
+    OutsideFile { path: PathBuf, uri: String },
 }
 
-/// Reads an image.
+/// Reads a triangle mesh, in the units of the file (taken as metres).
+///
+/// The ending of the name tells the format: `.obj`, `.gltf` or `.glb`. All parts of the file become
+/// one mesh; materials, skins and morph targets are not read.
+///
+/// * Vertex normals have unit length; one which is missing, zero or not finite in a mesh that has
+///   normals is replaced by the normal of the face. A mesh without any normals stays without.
+/// * `v` grows upwards: glTF, where it grows downwards, is flipped.
+/// * Triangles of zero area are dropped, and vertices that no triangle uses.
 ///
 /// # Errors
-/// Always.
-pub fn load_image(_path: &Path, _encoding: Encoding) -> Result<ImageData, AssetError> {
-    Err(AssetError::Unsupported)
+/// When the file cannot be read, is malformed, holds positions or texture coordinates which are not
+/// finite, exceeds a limit of this module, or has no triangle of positive area.
+pub fn load_mesh(path: &Path) -> Result<TriangleMesh, AssetError> {
+    match mesh_format(path)? {
+        MeshFormat::Obj => {
+            let mesh = obj::parse(&read_file(path)?, path)?;
+            tidy::tidy(mesh, path)
+        }
+        MeshFormat::Gltf => {
+            let mesh = gltf::Asset::open(path)?.triangles()?;
+            tidy::tidy(mesh, path)
+        }
+    }
 }
 
-/// Reads a mesh.
-///
-/// # Errors
-/// Always.
-pub fn load_mesh(_path: &Path) -> Result<TriangleMesh, AssetError> {
-    Err(AssetError::Unsupported)
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum MeshFormat {
+    Obj,
+    Gltf,
+}
+
+fn mesh_format(path: &Path) -> Result<MeshFormat, AssetError> {
+    let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    match ending.as_deref() {
+        Some("obj") => Ok(MeshFormat::Obj),
+        Some("gltf" | "glb") => Ok(MeshFormat::Gltf),
+        other => Err(AssetError::UnknownFormat {
+            path: path.to_owned(),
+            found: other.map_or_else(
+                || "a file without an ending".to_owned(),
+                |ending| format!("a file with the ending `.{ending}`"),
+            ),
+            expected: "a mesh: `.obj`, `.gltf` or `.glb`",
+        }),
+    }
+}
+
+/// Reads a whole file of at most [`MAX_FILE_BYTES`].
+fn read_file(path: &Path) -> Result<Vec<u8>, AssetError> {
+    let failed = |cause| AssetError::Read { path: path.to_owned(), cause };
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    // Opening a folder succeeds on some systems; reading it would fail with a stranger message.
+    if metadata.is_dir() {
+        return Err(failed(io::ErrorKind::IsADirectory.into()));
+    }
+    if metadata.len() > MAX_FILE_BYTES {
+        return Err(too_large(path, format!("{} bytes", metadata.len()), MAX_FILE_BYTES));
+    }
+    let mut bytes = Vec::new();
+    // A device or a pipe reports no length, and a file may grow: the reader is limited as well.
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(too_large(path, "more bytes than it said".to_owned(), MAX_FILE_BYTES));
+    }
+    Ok(bytes)
+}
+
+fn too_large(path: &Path, found: String, limit: impl ToString) -> AssetError {
+    AssetError::TooLarge { path: path.to_owned(), found, limit: limit.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::Encoding;
+
+    #[test]
+    fn a_missing_file_and_an_unknown_ending_are_named_in_the_error() {
+        let error = load_mesh(Path::new("nowhere/rabbit.obj")).unwrap_err();
+        assert!(error.to_string().contains("rabbit.obj"), "{error}");
+        let error = load_mesh(Path::new("rabbit.stl")).unwrap_err();
+        assert!(error.to_string().contains("`.stl`") && error.to_string().contains("`.glb`"));
+        let error = load_image(Path::new("nowhere/wood.png"), Encoding::Srgb).unwrap_err();
+        assert!(error.to_string().contains("wood.png"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_is_not_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(matches!(read_file(folder.path()), Err(AssetError::Read { .. })));
+    }
 }

@@ -1,0 +1,45 @@
+//! Writes the meshes and textures that the scenes name into `assets/`.
+//!
+//! `cargo run --release --example make_assets` writes them into the repository, where they are
+//! kept; with the name of a folder it writes them there. `-- --keys` prints the key lists of the
+//! scenes instead. Everything follows from the numbers in this program: each run gives the same
+//! files, which a test holds.
+
+mod keys;
+mod knife;
+mod noise;
+mod textures;
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ImageBuffer, Rgb};
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use textures::Painting;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let argument = std::env::args().nth(1);
+    if argument.as_deref() == Some("--keys") {
+        println!("swing:{}\n\nringing:{}", keys::swing(), keys::ringing());
+        return Ok(());
+    }
+    let folder = argument
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("assets"), PathBuf::from);
+    fs::create_dir_all(&folder)?;
+    fs::write(folder.join("knife-blade.obj"), knife::blade())?;
+    fs::write(folder.join("knife-handle.obj"), knife::handle())?;
+    save(&textures::STONE_WALL, &folder.join("stone-wall.png"))?;
+    save(&textures::WOOD_BOARD, &folder.join("wood.png"))?;
+    Ok(())
+}
+
+/// Writes a PNG as small as the encoder can make it: these files are kept.
+fn save(painting: &Painting, path: &Path) -> Result<(), Box<dyn Error>> {
+    let (width, height) = painting.size;
+    let image = ImageBuffer::from_fn(width, height, |x, y| Rgb(painting.pixel(x, y)));
+    let file = BufWriter::new(File::create(path)?);
+    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
+    image.write_with_encoder(encoder)?;
+    Ok(())
+}

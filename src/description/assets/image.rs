@@ -1,0 +1,287 @@
+//! Images: PNG, JPEG, Radiance HDR and OpenEXR to [`ImageData`].
+
+use super::{AssetError, MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, read_file, too_large};
+use crate::description::{Encoding, ImageData, ImagePixels};
+use exr::prelude::{ReadChannels, ReadLayers};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use std::io::Cursor;
+use std::path::Path;
+
+/// The first bytes of every OpenEXR file.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Reads an image; row 0 is the top.
+///
+/// * 8-bit PNG and JPEG keep their codes, to be decoded by `encoding` at lookup.
+/// * 16-bit PNG is decoded to linear `f32` by `encoding` here.
+/// * Radiance HDR and OpenEXR hold linear `f32`, whatever `encoding` says. Of an OpenEXR file the
+///   first part with the channels R, G and B is read, and its A (1 where there is none); its data
+///   window is the picture.
+///
+/// Colours are taken as they are in Rec. 709 primaries: profiles and chromaticities are not read.
+///
+/// # Errors
+/// When the file cannot be read, is of another format, malformed, cut off, or larger than
+/// [`MAX_IMAGE_SIDE`] or [`MAX_IMAGE_BYTES`] allow.
+pub fn load_image(path: &Path, encoding: Encoding) -> Result<ImageData, AssetError> {
+    parse(&read_file(path)?, encoding, path)
+}
+
+fn parse(bytes: &[u8], encoding: Encoding, path: &Path) -> Result<ImageData, AssetError> {
+    if bytes.starts_with(&EXR_MAGIC) {
+        read_exr(bytes, path)
+    } else {
+        decode(bytes, encoding, path)
+    }
+}
+
+/// Decodes everything but OpenEXR.
+fn decode(bytes: &[u8], encoding: Encoding, path: &Path) -> Result<ImageData, AssetError> {
+    let failed = |cause| AssetError::Image { path: path.to_owned(), cause };
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|cause| AssetError::Read { path: path.to_owned(), cause })?;
+    if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) {
+        return Err(AssetError::UnknownFormat {
+            path: path.to_owned(),
+            found: if bytes.is_empty() { "empty" } else { "of an unknown format" }.to_owned(),
+            expected: "an image: PNG, JPEG, Radiance HDR or OpenEXR",
+        });
+    }
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_IMAGE_SIDE);
+    limits.max_image_height = Some(MAX_IMAGE_SIDE);
+    limits.max_alloc = Some(MAX_IMAGE_BYTES);
+    reader.limits(limits);
+    let image = reader.decode().map_err(failed)?;
+    let (width, height) = (image.width(), image.height());
+    check_size(width.into(), height.into(), path)?;
+    Ok(ImageData { width, height, pixels: pixels(image, encoding) })
+}
+
+/// The pixels in the smallest storage that keeps their precision.
+fn pixels(image: DynamicImage, encoding: Encoding) -> ImagePixels {
+    match image {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            ImagePixels::Rgba32F(image.into_rgba32f().pixels().map(|p| p.0).collect())
+        }
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => {
+            let linear = |code: u16| {
+                let value = f64::from(code) / f64::from(u16::MAX);
+                match encoding {
+                    Encoding::Srgb => srgb_to_linear(value) as f32,
+                    Encoding::Linear => value as f32,
+                }
+            };
+            let decode = |[r, g, b, a]: [u16; 4]| {
+                // Coverage is never encoded.
+                [linear(r), linear(g), linear(b), f32::from(a) / f32::from(u16::MAX)]
+            };
+            ImagePixels::Rgba32F(image.into_rgba16().pixels().map(|p| decode(p.0)).collect())
+        }
+        _ => ImagePixels::Rgba8(image.into_rgba8().pixels().map(|p| p.0).collect(), encoding),
+    }
+}
+
+/// The sRGB curve (IEC 61966-2-1), from code to linear, both in `[0, 1]`.
+fn srgb_to_linear(code: f64) -> f64 {
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Refuses images that are too large, before their pixels are allocated where that can be known.
+fn check_size(width: u64, height: u64, path: &Path) -> Result<(), AssetError> {
+    let side = u64::from(MAX_IMAGE_SIDE);
+    let bytes = width.saturating_mul(height).saturating_mul(size_of::<[f32; 4]>() as u64);
+    if width > side || height > side || bytes > MAX_IMAGE_BYTES {
+        let limit = format!("{side} pixels on a side and {MAX_IMAGE_BYTES} bytes decoded");
+        return Err(too_large(path, format!("{width} × {height} pixels"), limit));
+    }
+    Ok(())
+}
+
+fn read_exr(bytes: &[u8], path: &Path) -> Result<ImageData, AssetError> {
+    let failed = |cause| AssetError::Exr { path: path.to_owned(), cause };
+    // Metadata alone first, so that a forged size is refused before memory is taken for it.
+    let metadata =
+        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
+    for header in &metadata.headers {
+        check_size(header.layer_size.0 as u64, header.layer_size.1 as u64, path)?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| (size.0, vec![[0.0_f32; 4]; size.0 * size.1]),
+            |(width, pixels), at, (r, g, b, a): (f32, f32, f32, f32)| {
+                pixels[at.1 * *width + at.0] = [r, g, b, a];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(failed)?;
+    let size = image.layer_data.size;
+    Ok(ImageData {
+        width: size.0 as u32,
+        height: size.1 as u32,
+        pixels: ImagePixels::Rgba32F(image.layer_data.channel_data.pixels.1),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageBuffer, Rgb, Rgba};
+    use std::path::PathBuf;
+    use tempfile::TempDir;
+
+    fn in_folder(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        (folder, path)
+    }
+
+    fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        image.into().write_to(&mut Cursor::new(&mut bytes), format).unwrap();
+        bytes
+    }
+
+    fn small_png() -> Vec<u8> {
+        let image = ImageBuffer::from_fn(3, 2, |x, y| Rgba([x as u8 * 80, y as u8 * 200, 7, 9]));
+        encoded(image, ImageFormat::Png)
+    }
+
+    fn small_exr() -> Vec<u8> {
+        use exr::prelude::{Image, SpecificChannels, WritableImage};
+        let mut bytes = Vec::new();
+        let pixel = |at: exr::math::Vec2<usize>| (at.0 as f32, at.1 as f32 + 0.5, 1e6_f32);
+        Image::from_channels((3, 2), SpecificChannels::rgb(pixel))
+            .write()
+            .to_buffered(Cursor::new(&mut bytes))
+            .unwrap();
+        bytes
+    }
+
+    /// Oracle: the codes that were written, top row first.
+    #[test]
+    fn eight_bit_codes_are_kept_and_row_0_is_the_top() {
+        let (_folder, path) = in_folder("codes.png", &small_png());
+        let image = load_image(&path, Encoding::Linear).unwrap();
+        assert_eq!((image.width, image.height), (3, 2));
+        let ImagePixels::Rgba8(codes, Encoding::Linear) = image.pixels else {
+            panic!("8-bit codes and their encoding")
+        };
+        assert_eq!(codes[..4], [[0, 0, 7, 9], [80, 0, 7, 9], [160, 0, 7, 9], [0, 200, 7, 9]]);
+    }
+
+    /// Oracle: published values of the sRGB curve: 0.4613561 is the code of 0.18, 0.7353570 of ½.
+    #[test]
+    fn sixteen_bit_codes_become_linear_by_their_encoding() {
+        let code = |x: f64| (x * 65535.0).round() as u16;
+        let texel = [code(0.461_356_1), code(0.735_357), code(0.040_449_9), code(0.25)];
+        let image = ImageBuffer::from_fn(1, 1, |_, _| Rgba(texel));
+        let (_folder, path) = in_folder("deep.png", &encoded(image, ImageFormat::Png));
+        for (encoding, expected) in [
+            (Encoding::Srgb, [0.18, 0.5, 0.003_130_8, 0.25]),
+            (Encoding::Linear, [0.461_356_1, 0.735_357, 0.040_449_9, 0.25]),
+        ] {
+            let ImagePixels::Rgba32F(pixels) = load_image(&path, encoding).unwrap().pixels else {
+                panic!("16-bit codes need floats")
+            };
+            for (found, expected) in pixels[0].iter().zip(expected) {
+                // Half a 16-bit code, times the greatest slope of the curve (2.28).
+                assert!(
+                    (found - expected).abs() < 2.28 * 0.5 / 65535.0 + 1e-7,
+                    "{found} {expected}"
+                );
+            }
+        }
+    }
+
+    /// Oracle: RGBE keeps 8 bits of mantissa, so powers of two are exact.
+    #[test]
+    fn radiance_hdr_is_linear_and_unbounded() {
+        let image = ImageBuffer::from_fn(2, 1, |x, _| Rgb([64.0 + 64.0 * x as f32, 64.0, 64.0]));
+        let (_folder, path) = in_folder("sky.hdr", &encoded(image, ImageFormat::Hdr));
+        let ImagePixels::Rgba32F(pixels) = load_image(&path, Encoding::Srgb).unwrap().pixels else {
+            panic!("floats")
+        };
+        assert_eq!(pixels, [[64.0, 64.0, 64.0, 1.0], [128.0, 64.0, 64.0, 1.0]]);
+    }
+
+    #[test]
+    fn exr_is_read_exactly_and_without_alpha_it_is_opaque() {
+        let (_folder, path) = in_folder("sky.exr", &small_exr());
+        let image = load_image(&path, Encoding::Srgb).unwrap();
+        let ImagePixels::Rgba32F(pixels) = image.pixels else { panic!("floats") };
+        assert_eq!((image.width, image.height), (3, 2));
+        assert_eq!(pixels[1].map(f32::to_bits), [1.0, 0.5, 1e6, 1.0].map(f32::to_bits));
+        assert_eq!(pixels[5].map(f32::to_bits), [2.0, 1.5, 1e6, 1.0].map(f32::to_bits));
+    }
+
+    /// An image is known by its contents: a wrong ending does no harm.
+    #[test]
+    fn the_name_does_not_matter_and_other_formats_are_refused() {
+        let (_folder, path) = in_folder("really_a_png.jpg", &small_png());
+        assert!(load_image(&path, Encoding::Srgb).is_ok());
+        for bytes in [&b""[..], b"GIF89a\x01\0\x01\0\0\0\0;", b"not an image at all"] {
+            let (_folder, path) = in_folder("texture.png", bytes);
+            let error = load_image(&path, Encoding::Srgb).unwrap_err();
+            assert!(matches!(error, AssetError::UnknownFormat { .. }), "{error}");
+        }
+    }
+
+    /// A PNG of a few bytes which says that it is 0 × 0, or 2³¹ − 1 on a side.
+    #[test]
+    fn forged_sizes_are_refused_before_memory_is_taken() {
+        for side in [0_u32, MAX_IMAGE_SIDE + 1, u32::MAX / 2] {
+            let mut png = small_png();
+            png[16..20].copy_from_slice(&side.to_be_bytes());
+            png[20..24].copy_from_slice(&side.to_be_bytes());
+            let crc = crc32(&png[12..29]);
+            png[29..33].copy_from_slice(&crc.to_be_bytes());
+            let (_folder, path) = in_folder("forged.png", &png);
+            assert!(load_image(&path, Encoding::Srgb).is_err(), "side {side}");
+        }
+    }
+
+    /// CRC-32 of PNG, annex D, bit by bit.
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(u32::MAX, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |c, _| (c >> 1) ^ (0xedb8_8320 * (c & 1)))
+        })
+    }
+
+    /// Every cut and every changed byte gives an image or an error; a cut PNG or EXR is an error.
+    #[test]
+    fn cut_and_mutated_images_never_panic() {
+        let hdr = encoded(
+            ImageBuffer::from_fn(9, 2, |x, y| Rgb([x as f32, y as f32, 1.0])),
+            ImageFormat::Hdr,
+        );
+        let jpeg = encoded(
+            ImageBuffer::from_fn(9, 9, |x, y| Rgb([x as u8, y as u8, 1])),
+            ImageFormat::Jpeg,
+        );
+        let path = Path::new("mutant");
+        for (bytes, cut_is_error) in
+            [(small_png(), true), (small_exr(), true), (hdr, false), (jpeg, false)]
+        {
+            for at in 0..bytes.len() {
+                let cut = parse(&bytes[..at], Encoding::Srgb, path);
+                // The last bytes of a PNG are its IEND chunk, without which all pixels are there.
+                assert!(!cut_is_error || cut.is_err() || at + 12 >= bytes.len(), "cut at {at}");
+                for flip in [0xff, 0x80, 0x01] {
+                    let mut mutant = bytes.clone();
+                    mutant[at] ^= flip;
+                    let _ = parse(&mutant, Encoding::Srgb, path);
+                }
+            }
+        }
+    }
+}
