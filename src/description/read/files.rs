@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// Greatest size of a scene file in bytes. Larger things belong into mesh and image files.
 pub(super) const MAX_SCENE_BYTES: u64 = 8 << 20;
-/// Greatest size of an image or mesh file in bytes.
-pub(super) const MAX_ASSET_BYTES: u64 = 2 << 30;
 
 /// Why a file cannot be used.
 #[derive(Debug, thiserror::Error)]

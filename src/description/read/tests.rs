@@ -1073,7 +1073,7 @@ fn names_defined_in_two_files_are_told_with_both_places() {
     1 | (include: ["eye.ron"], entities: {"eye": (camera: ())})
       |                                   ^^^^^ entities.eye
       |
-     ::: eye.ron:1:13
+     ::: …/eye.ron:1:13
       |
     1 | (entities: {"eye": (camera: ())})
       |             ----- first given here
@@ -1090,13 +1090,13 @@ fn files_which_include_themselves_or_are_missing_are_told() {
     ]);
     insta::assert_snapshot!(mistakes_of_file(&folder, "a.ron"), @r#"
     error[scene::include]: `a.ron` includes itself
-     --> b.ron:1:12
+     --> …/b.ron:1:12
       |
     1 | (include: ["a.ron", "d.ron"])
       |            ^^^^^^^ include.0
 
     error[scene::syntax]: this `{` is never closed by a `}`
-     --> d.ron:1:12
+     --> …/d.ron:1:12
       |
     1 | (entities: {
       |            ^
@@ -1115,6 +1115,36 @@ fn files_which_include_themselves_or_are_missing_are_told() {
     1 | (include: ["b.ron", "c.rno", "."])
       |                              ^^^ include.2
     "#);
+}
+
+#[test]
+fn what_is_probably_not_meant_is_told_as_a_warning() {
+    let text = r#"(entities: {"eye": (camera: ()), "ball": (shape: Sphere(), material: "used")},
+        textures: {"deep": Checker(), "idle": Checker()},
+        materials: {"part": Diffuse(albedo: "deep"), "used": Masked(material: "part", opacity: 1),
+                    "idle": Mirror()})"#;
+    insta::assert_snapshot!(scene(text).warnings.to_string(), @r#"
+    scene.ron:2:39: nothing uses the texture `idle`
+    scene.ron:4:21: nothing uses the material `idle`
+    the scene has no light: every picture of it is black
+    "#);
+}
+
+/// The scenes which come with the program.
+#[test]
+fn the_scenes_of_the_repository_are_right() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut count = 0;
+    for entry in folder.read_dir().expect("the scenes are there") {
+        let path = entry.expect("readable").path();
+        if path.extension().is_some_and(|ending| ending == "ron") {
+            let scene = load_scene(&path, &LoadOptions::default());
+            let scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+            assert_eq!(scene.warnings.render(false), "", "{}", path.display());
+            count += 1;
+        }
+    }
+    assert!(count > 0);
 }
 
 #[test]
@@ -1146,13 +1176,13 @@ fn files_which_cannot_be_used_are_told_where_they_are_named() {
       |
       = help: files are looked for beside the scene, in `assets/` beside it or beside its folder, and in the asset folders of the command line
 
-    error[scene::asset]: `text.png` cannot be used as an image: this kind of file is not supported
+    error[scene::asset]: this image cannot be used: `…/text.png` is of an unknown format; expected an image: PNG, JPEG, Radiance HDR or OpenEXR
      --> …/scene.ron:2:30
       |
     2 |             "c": Image(file: "text.png")}, meshes: {"m": File("text.obj")},
       |                              ^^^^^^^^^^ textures.c.Image.file
 
-    error[scene::asset]: `text.obj` cannot be used as a mesh: this kind of file is not supported
+    error[scene::asset]: this mesh cannot be used: `…/text.obj`, line 1: found position 1, expected one of the 0 given so far
      --> …/scene.ron:2:63
       |
     2 |             "c": Image(file: "text.png")}, meshes: {"m": File("text.obj")},
