@@ -89,7 +89,8 @@ impl Diagnostics {
             text.push('\n');
         }
         if self.0.len() > SHOWN {
-            text += &format!("\n… and {} more\n", self.0.len() - SHOWN);
+            let more = self.0.len() - SHOWN;
+            text.push_str(&["\n… and ", &more.to_string(), " more\n"].concat());
         }
         text
     }

@@ -1,8 +1,8 @@
 //! A whole scene as plain, validated data.
 
 use super::{
-    Acceleration, Camera, Clock, Emission, ImageData, Keyframes, Light, LookAt, Material,
-    RenderSettings, Shape, Texture, Transform, TriangleMesh, Velocity,
+    Acceleration, Camera, Clock, Diagnostics, Emission, ImageData, Keyframes, Light, LookAt,
+    Material, RenderSettings, Shape, Texture, Transform, TriangleMesh, Velocity,
 };
 use indexmap::IndexMap;
 use std::path::PathBuf;
@@ -17,6 +17,8 @@ pub struct SceneDescription {
     pub files: Vec<PathBuf>,
     /// XXH3-128 over the bytes of all those files and their names.
     pub content_hash: u128,
+    /// What is probably not meant: definitions which nothing uses, a scene without light.
+    pub warnings: Diagnostics,
     /// Frames and shutter.
     pub clock: Clock,
     /// Settings of the render.

@@ -2,6 +2,7 @@
 
 mod components;
 mod resources;
+mod spawn;
 
 pub use components::{
     Acceleration, ActiveCamera, Camera, ChildOf, Children, Emission, EmissionFactor,
@@ -9,3 +10,4 @@ pub use components::{
     Shape, ShutterMotion, Texture, Transform, Velocity, WorldTransform,
 };
 pub use resources::{FrameClock, SceneTime, Settings};
+pub use spawn::{SceneEntities, spawn_scene};

@@ -1,14 +1,14 @@
 //! The definitions of all files of a scene, gathered by name and read one by one.
 
 use super::decode::{Report, decode, decode_fields};
-use super::files::{self, MAX_ASSET_BYTES};
+use super::files;
 use super::limits;
 use super::outline::Kind;
 use super::overrides::FIELDS;
 use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
 use super::{ContentHash, LoadOptions, Names, entity, relations};
-use crate::description::assets::{load_image, load_mesh};
+use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, suggestion};
 use crate::description::{
     Clock, Encoding, Filter, ImageData, RenderSettings, SceneDescription, Texture, TriangleMesh,
@@ -87,6 +87,7 @@ pub(super) fn assemble(
     }
     relations::check_shares(&scene, names, report);
     scene.content_hash = assets.hash.0.digest128();
+    scene.warnings = relations::warnings(&scene, names);
     if report.found.has_errors() {
         Err(in_order(std::mem::take(&mut report.found)))
     } else {
@@ -310,7 +311,7 @@ impl Assets<'_> {
         report: &mut Report,
     ) -> Option<PathBuf> {
         let dir = place.source.dir.as_deref();
-        let found = files::find(name, dir, self.options, MAX_ASSET_BYTES).and_then(|path| {
+        let found = files::find(name, dir, self.options, MAX_FILE_BYTES).and_then(|path| {
             if !scene.files.contains(&path) {
                 self.hash_file(name, &path).map_err(|source| files::FileError::Unreadable {
                     name: name.to_owned(),
@@ -364,7 +365,7 @@ impl Assets<'_> {
                 return Ok::<_, ()>(image.clone());
             }
             let image = load_image(&key.0, encoding).map_err(|error| {
-                let message = format!("`{name}` cannot be used as an image: {error}");
+                let message = format!("this image cannot be used: {error}");
                 report.at("scene::asset", &place, message);
             })?;
             Ok(self.images.entry(key).or_insert(Arc::new(image)).clone())
@@ -390,7 +391,7 @@ impl Assets<'_> {
                     return Some(mesh.clone());
                 }
                 let mesh = load_mesh(&path).map_err(|error| {
-                    let message = format!("`{name}` cannot be used as a mesh: {error}");
+                    let message = format!("this mesh cannot be used: {error}");
                     report.at("scene::asset", &place, message);
                 });
                 let mesh = Arc::new(mesh.ok()?);

@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// Greatest size of a scene file in bytes. Larger things belong into mesh and image files.
 pub(super) const MAX_SCENE_BYTES: u64 = 8 << 20;
-/// Greatest size of an image or mesh file in bytes.
-pub(super) const MAX_ASSET_BYTES: u64 = 2 << 30;
 
 /// Why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -127,4 +125,93 @@ fn near(name: &str, roots: &[PathBuf]) -> Option<String> {
         .collect();
     crate::description::diagnostic::nearest(name, names.iter().map(String::as_str))
         .map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    /// A project with a scene folder, assets beside it, and a secret outside.
+    fn project() -> (tempfile::TempDir, PathBuf) {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let scenes = root.path().join("project/scenes");
+        fs::create_dir_all(scenes.join("assets/deep")).expect("fresh folder");
+        fs::create_dir_all(root.path().join("project/assets")).expect("fresh folder");
+        for file in [
+            "project/scenes/beside.png",
+            "project/scenes/assets/below.png",
+            "project/scenes/assets/deep/deep.png",
+            "project/assets/shared.png",
+            "secret.png",
+        ] {
+            fs::write(root.path().join(file), file).expect("writable");
+        }
+        (root, scenes)
+    }
+
+    fn found(name: &str, dir: &Path, options: &LoadOptions) -> Result<String, &'static str> {
+        find(name, Some(dir), options, 100)
+            .map(|path| fs::read_to_string(path).expect("it was found"))
+            .map_err(|error| error.code())
+    }
+
+    #[test]
+    fn files_are_found_beside_the_scene_and_in_the_asset_folders() {
+        let (root, scenes) = project();
+        let options = LoadOptions::default();
+        let ok = |file: &str| Ok(format!("project/{file}"));
+        assert_eq!(found("beside.png", &scenes, &options), ok("scenes/beside.png"));
+        assert_eq!(found("below.png", &scenes, &options), ok("scenes/assets/below.png"));
+        assert_eq!(found("deep/deep.png", &scenes, &options), ok("scenes/assets/deep/deep.png"));
+        assert_eq!(found("shared.png", &scenes, &options), ok("assets/shared.png"));
+        assert_eq!(found("../assets/shared.png", &scenes, &options), ok("assets/shared.png"));
+        assert_eq!(found("secret.png", &scenes, &options), Err("scene::missing-file"));
+        let options = LoadOptions { asset_dirs: vec![root.path().into()], ..options };
+        assert_eq!(found("secret.png", &scenes, &options), Ok("secret.png".into()));
+    }
+
+    #[test]
+    fn files_outside_are_refused_unless_allowed() {
+        let (root, scenes) = project();
+        let secret = root.path().join("secret.png");
+        let absolute = secret.to_str().expect("a plain name");
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&secret, scenes.join("link.png")).expect("a link");
+        let names: &[&str] = if cfg!(unix) {
+            &["../../secret.png", absolute, "link.png"]
+        } else {
+            &["../../secret.png", absolute]
+        };
+        let loose = LoadOptions { allow_outside: true, ..LoadOptions::default() };
+        for name in names {
+            assert_eq!(
+                found(name, &scenes, &LoadOptions::default()),
+                Err("scene::outside"),
+                "{name}"
+            );
+            assert_eq!(found(name, &scenes, &loose), Ok("secret.png".into()), "{name}");
+        }
+        // Whether an absolute name exists is not told.
+        let gone = found("/no/such/file.png", &scenes, &LoadOptions::default());
+        assert_eq!(gone, Err("scene::outside"));
+    }
+
+    #[test]
+    fn what_is_no_small_file_is_refused() {
+        let (_root, scenes) = project();
+        let options = LoadOptions::default();
+        assert_eq!(found("assets", &scenes, &options), Err("scene::not-a-file"));
+        assert_eq!(found("", &scenes, &options), Err("scene::not-a-file"));
+        let too_large = find("beside.png", Some(&scenes), &options, 5).expect_err("25 bytes");
+        assert_eq!(too_large.code(), "scene::too-large");
+    }
+
+    #[test]
+    fn a_misspelt_file_is_told_with_the_one_that_was_meant() {
+        let (_root, scenes) = project();
+        let error = find("besid.png", Some(&scenes), &LoadOptions::default(), 100);
+        let help = error.expect_err("it is misspelt").help();
+        assert_eq!(help.as_deref(), Some("did you mean `beside.png`?"));
+    }
 }

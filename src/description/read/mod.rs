@@ -217,7 +217,11 @@ impl<'o> Loader<'o> {
         } else if !self.files.contains(&path) {
             self.files.push(path.clone());
             self.open.push(path.clone());
-            self.read_bytes(name, name, bytes, path.parent());
+            // Shown as seen from the including file, if that is where it was found.
+            let shown = Path::new(&entry.source.file.name).with_file_name(name);
+            let beside = shown.canonicalize().is_ok_and(|beside| beside == path);
+            let shown = if beside { shown } else { path.clone() };
+            self.read_bytes(&shown.display().to_string(), name, bytes, path.parent());
             self.open.pop();
         }
     }

@@ -4,9 +4,12 @@ use super::decode::Report;
 use super::source::Cursor;
 use super::surface::reference;
 use super::{LoadOptions, Names};
-use crate::description::diagnostic::{Diagnostic, Severity, suggestion};
-use crate::description::{Material, SceneDescription, Texture, Value};
+use crate::description::diagnostic::{Diagnostic, Diagnostics, Severity, suggestion};
+use crate::description::{
+    EmissionStrength, Light, Material, SceneDescription, Shape, Texture, Value,
+};
 use indexmap::IndexMap;
+use std::collections::HashSet;
 
 /// Reports entities which are their own ancestors, and materials made of themselves.
 pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
@@ -170,5 +173,78 @@ pub(super) fn check_shares(scene: &SceneDescription, names: &Names, report: &mut
                 format!("`{field}` must be at most 1, but the texture `{texture}` goes beyond");
             report.at("scene::out-of-range", &names.materials[name].at(field), message);
         }
+    }
+}
+
+/// Warnings about definitions which nothing uses, and about a scene without light.
+pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
+    let mut used = HashSet::new();
+    for entity in scene.entities.values() {
+        used.extend(entity.material.iter().map(|name| ("material", name.clone())));
+        if let Some(Shape::Mesh(name)) = &entity.shape {
+            used.insert(("mesh", name.clone()));
+        }
+        let emitted = entity.emission.as_ref().and_then(|emission| match &emission.strength {
+            EmissionStrength::Radiance(value) => value.texture(),
+            EmissionStrength::Power(_) => None,
+        });
+        let shining = entity.light.as_ref().and_then(|light| match light {
+            Light::Sky { radiance, .. } => radiance.texture(),
+            _ => None,
+        });
+        used.extend(emitted.into_iter().chain(shining).map(|name| ("texture", name.clone())));
+    }
+    // What a used material refers to is used; following the parts ends, for there are no cycles.
+    let mut open: Vec<String> = scene.materials.keys().cloned().collect();
+    open.retain(|name| used.contains(&("material", name.clone())));
+    while let Some(name) = open.pop() {
+        let Some(material) = scene.materials.get(&name) else { continue };
+        let mut textures = Vec::new();
+        let mut parts = Vec::new();
+        let mapped: Result<Material<()>, std::convert::Infallible> = material.clone().map_refs(
+            &mut |name| {
+                textures.push(name);
+                Ok(())
+            },
+            &mut |name| {
+                parts.push(name);
+                Ok(())
+            },
+        );
+        debug_assert!(mapped.is_ok());
+        used.extend(textures.into_iter().map(|name| ("texture", name)));
+        for part in parts {
+            if used.insert(("material", part.clone())) {
+                open.push(part);
+            }
+        }
+    }
+    let mut warnings = Vec::new();
+    let kinds =
+        [("texture", &names.textures), ("material", &names.materials), ("mesh", &names.meshes)];
+    for (kind, defined) in kinds {
+        for (name, cursor) in defined {
+            if !used.contains(&(kind, name.clone())) {
+                let message = format!("nothing uses the {kind} `{name}`");
+                warnings.push(warning("scene::unused", message, Some(cursor)));
+            }
+        }
+    }
+    if scene.entities.values().all(|entity| entity.emission.is_none() && entity.light.is_none()) {
+        let message = "the scene has no light: every picture of it is black".to_owned();
+        warnings.push(warning("scene::dark", message, None));
+    }
+    Diagnostics(warnings)
+}
+
+fn warning(code: &'static str, message: String, cursor: Option<&Cursor>) -> Diagnostic {
+    Diagnostic {
+        severity: Severity::Warning,
+        code,
+        message,
+        place: cursor.map(Cursor::key_place),
+        label: cursor.map(|cursor| cursor.path.clone()).unwrap_or_default(),
+        related: Vec::new(),
+        help: None,
     }
 }
