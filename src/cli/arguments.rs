@@ -129,7 +129,7 @@ pub struct SceneArguments {
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
 
-    /// Change any value of the scene, such as render.max_depth=8 (repeatable)
+    /// Change any value of the scene, such as `render.max_depth=8` (repeatable)
     ///
     /// The path names fields as the scene file does; the value is written as in the file:
     /// --set entities.ball.velocity.linear=(2,0,0)

@@ -159,7 +159,7 @@ fn kinds(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinora::description::{ImageData, TriangleMesh};
+    use kinora::description::{Channel, Encoding, ImageData, TextureFilter, TriangleMesh, Wrap};
 
     #[test]
     fn the_contents_of_a_scene_are_counted() {
@@ -171,10 +171,10 @@ mod tests {
         for name in ["t", "u"] {
             let texture = Texture::Image {
                 file: image.clone(),
-                encoding: Default::default(),
-                wrap: Default::default(),
-                filter: Default::default(),
-                channel: Default::default(),
+                encoding: Encoding::Srgb,
+                wrap: Wrap::Repeat,
+                filter: TextureFilter::Bilinear,
+                channel: Channel::Luminance,
                 repeat: glam::Vec2::ONE,
                 offset: glam::Vec2::ZERO,
             };

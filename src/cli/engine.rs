@@ -96,6 +96,7 @@ mod stand_in {
 
     pub struct Simulation(SceneDescription);
     impl Simulation {
+        #[expect(clippy::unnecessary_wraps, reason = "as the library will")]
         pub fn from_description(scene: &SceneDescription) -> Result<Self, FilmError> {
             Ok(Self(scene.clone()))
         }
@@ -141,7 +142,9 @@ mod stand_in {
                     Ok(buffer)
                 })
                 .collect::<Result<_, _>>()?;
-            buffers.into_iter().for_each(|buffer| film.merge(buffer));
+            for buffer in buffers {
+                film.merge(buffer);
+            }
             let report = FrameReport {
                 frame,
                 stage_seconds: vec![("step", 0.0), ("integrate", start.elapsed().as_secs_f64())],

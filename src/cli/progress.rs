@@ -326,8 +326,7 @@ mod tests {
     #[test]
     fn the_watcher_ends_at_once_when_it_is_dropped() {
         let start = Instant::now();
-        let watcher =
-            Watcher::start(Duration::from_secs(3600), View::None, RenderControl::default());
+        let watcher = Watcher::start(Duration::from_hours(1), View::None, RenderControl::default());
         watcher.shared.set(Watched::Frame { frame: 1, index: 0, since: Instant::now() });
         drop(watcher);
         assert!(start.elapsed() < Duration::from_secs(10));

@@ -111,8 +111,9 @@ impl Job {
         );
         if kept > 0 {
             let which = if kept == total { "all".to_owned() } else { format!("{kept} of {total}") };
-            text +=
-                &format!("\n{which} are there already and are kept (--fresh renders them again)");
+            text.push('\n');
+            text.push_str(&which);
+            text.push_str(" are there already and are kept (--fresh renders them again)");
         }
         text
     }
@@ -142,9 +143,10 @@ impl Job {
             self.control.rays.store(0, Ordering::Relaxed);
             progress.frame_started(frame);
             let start = Instant::now();
-            let rendered = match self.control.cancel.load(Ordering::SeqCst) {
-                true => None,
-                false => engine.render_frame(frame, &self.control)?,
+            let rendered = if self.control.cancel.load(Ordering::SeqCst) {
+                None
+            } else {
+                engine.render_frame(frame, &self.control)?
             };
             let Some(rendered) = rendered else {
                 return Err(Failure::Interrupted {
@@ -182,8 +184,9 @@ impl Job {
             &report.integrator,
             world_to_camera,
         );
-        write_png(&files.png, &film, settings)?;
+        // The larger file first: on a full disk nothing of the frame remains.
         let saturated = write_exr(&files.exr, &film, settings, &metadata)?;
+        write_png(&files.png, &film, settings)?;
         Ok(FrameEntry {
             frame,
             fingerprint,

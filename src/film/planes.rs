@@ -181,6 +181,6 @@ mod tests {
         }
         film.merge(buffer);
         assert!(f32s(&film, Layer::Beauty, 0)[0].is_finite());
-        assert_eq!(f32s(&film, Layer::Variance, 0)[0], f32::MAX);
+        assert_eq!(f32s(&film, Layer::Variance, 0), [f32::MAX]);
     }
 }

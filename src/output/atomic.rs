@@ -13,7 +13,8 @@ use tempfile::{Builder, NamedTempFile};
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     let mut file = temporary_beside(path).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
+    // On the plain file: tempfile's own `Write` adds the temporary name to every message.
+    file.as_file_mut().write_all(bytes).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|error| failed(error.error))?;
     Ok(())

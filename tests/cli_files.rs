@@ -1,0 +1,177 @@
+//! The program from outside: exit codes, files, going on after an interruption.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SCENE: &str = r#"
+Scene(
+    entities: {
+        "camera": (transform: (translation: (0, 0, 4)), camera: (fov: 40)),
+        "ball": (shape: Sphere(radius: 1), emission: Radiance((0.5, 0.25, 0.125))),
+    },
+)
+"#;
+
+/// Runs `kinora` in `folder` on a scene of 8 × 8 pixels which is there as `a.ron`.
+fn render(folder: &Path, more: &[&str]) -> Output {
+    fs::write(folder.join("a.ron"), SCENE).expect("temporary folder is writable");
+    let common = ["render", "a.ron", "--size", "8x8", "--samples", "2"];
+    kinora(folder, &[&common, more].concat())
+}
+
+fn kinora(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kinora"));
+    command.current_dir(folder).args(arguments).output().expect("the program starts")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("temporary folder")
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("exists");
+    let mut names: Vec<_> =
+        entries.map(|e| e.expect("readable").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn help_and_version_succeed_and_misuse_is_code_2() {
+    let folder = folder();
+    for good in [&["--help"][..], &["--version"], &["render", "--help"], &["check", "-h"]] {
+        let output = kinora(folder.path(), good);
+        assert_eq!(output.status.code(), Some(0), "{good:?}");
+        assert!(output.stdout.len() > 5);
+    }
+    for wrong in [
+        &[][..],
+        &["paint"],
+        &["render"],
+        &["render", "a.ron", "--size", "8"],
+        &["render", "a.ron", "--size", "0x8"],
+        &["render", "a.ron", "--samples", "0"],
+        &["render", "a.ron", "--threads", "0"],
+        &["render", "a.ron", "--frames", "9-3"],
+        &["render", "a.ron", "--set", "render.samples"],
+        &["render", "a.ron", "--integrator", "magic"],
+    ] {
+        let output = kinora(folder.path(), wrong);
+        assert_eq!(output.status.code(), Some(2), "{wrong:?}: {}", stderr(&output));
+    }
+}
+
+#[test]
+fn a_missing_scene_is_code_1_and_leaves_no_folder() {
+    let folder = folder();
+    for command in ["render", "check"] {
+        let output = kinora(folder.path(), &[command, "nowhere.ron"]);
+        assert_eq!(output.status.code(), Some(1), "{command}");
+        assert!(stderr(&output).contains("nowhere.ron"), "{}", stderr(&output));
+    }
+    assert!(names_in(folder.path()).is_empty());
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_is_code_74() {
+    let folder = folder();
+    fs::write(folder.path().join("file"), "").expect("writable");
+    let output = render(folder.path(), &["--out", "file/deep"]);
+    assert_eq!(output.status.code(), Some(74));
+    assert!(stderr(&output).contains("file/deep"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_render_leaves_exactly_its_frames_and_the_record() {
+    let folder = folder();
+    let output = render(folder.path(), &["--frames", "7,3"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let out = folder.path().join("out/a");
+    assert_eq!(
+        names_in(&out),
+        ["a.0003.exr", "a.0003.png", "a.0007.exr", "a.0007.png", "manifest.json"]
+    );
+    let bytes = fs::read(out.join("manifest.json")).expect("was written");
+    let record: serde_json::Value = serde_json::from_slice(&bytes).expect("is JSON");
+    let frames: Vec<_> =
+        record["frames"].as_array().expect("list").iter().map(|f| &f["frame"]).collect();
+    assert_eq!(frames, [3, 7]);
+    assert_eq!(record["settings"]["size"], serde_json::json!([8, 8]));
+}
+
+#[test]
+fn only_what_is_missing_or_damaged_is_rendered_again() {
+    let folder = folder();
+    let out = folder.path().join("out/a");
+    let rendered = |more: &[&str]| {
+        let output =
+            render(folder.path(), &[&["--frames", "0-3", "--progress", "json"], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        let events = text.lines().map(|line| {
+            serde_json::from_str::<serde_json::Value>(line).expect("one object a line")
+        });
+        let frames = events.filter(|e| e["event"] == "frame");
+        frames.map(|e| e["frame"].as_u64().expect("number")).collect::<Vec<_>>()
+    };
+    assert_eq!(rendered(&[]), [0, 1, 2, 3]);
+    let whole = fs::read(out.join("a.0002.exr")).expect("was written");
+    assert_eq!(rendered(&[]), [0_u64; 0]);
+    fs::write(out.join("a.0002.exr"), &whole[..whole.len() / 2]).expect("writable");
+    fs::remove_file(out.join("a.0000.png")).expect("was written");
+    assert_eq!(rendered(&[]), [0, 2]);
+    assert_eq!(fs::read(out.join("a.0002.exr")).expect("was written"), whole, "to the byte");
+    assert_eq!(rendered(&["--seed", "5"]), [0, 1, 2, 3]);
+    assert_eq!(rendered(&["--seed", "5", "--fresh"]), [0, 1, 2, 3]);
+}
+
+#[test]
+fn the_files_do_not_depend_on_the_number_of_threads() {
+    let folder = folder();
+    for threads in ["1", "2", "5"] {
+        let arguments =
+            ["--threads", threads, "--out", threads, "--frames", "2", "--size", "70x40"];
+        fs::write(folder.path().join("a.ron"), SCENE).expect("writable");
+        let output = kinora(
+            folder.path(),
+            &[&["render", "a.ron", "--samples", "3"][..], &arguments].concat(),
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        for name in ["a.0002.exr", "a.0002.png"] {
+            let read = |of: &str| fs::read(folder.path().join(of).join(name)).expect("was written");
+            assert!(read(threads) == read("1"), "{name} with {threads} threads");
+        }
+    }
+}
+
+/// The manifest is the first file of a run: when it is there, the render is under way.
+#[cfg(unix)]
+#[test]
+fn a_termination_signal_ends_with_code_75_and_nothing_torn() {
+    let folder = folder();
+    fs::write(folder.path().join("a.ron"), SCENE).expect("writable");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_kinora"))
+        .current_dir(folder.path())
+        .args(["render", "a.ron", "--frames", "0-99", "--size", "256x256", "--samples", "1000"])
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let manifest = folder.path().join("out/a/manifest.json");
+    for _ in 0..2000 {
+        if manifest.exists() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let killed = Command::new("kill").arg(child.id().to_string()).status().expect("kill exists");
+    assert!(killed.success());
+    let status = child.wait().expect("was started");
+    assert_eq!(status.code(), Some(75));
+    let names = names_in(&folder.path().join("out/a"));
+    assert!(names.iter().all(|name| !name.contains("tmp")), "{names:?}");
+}
