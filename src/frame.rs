@@ -3,7 +3,7 @@
 use crate::build::bvh::{MeshTrees, TopLevel};
 use crate::build::light::LightTable;
 use crate::description::{IntegratorChoice, SceneDescription};
-use crate::extract::{Instances, Requirements, ViewCamera};
+use crate::extract::{Instances, Requirements, Surfaces, ViewCamera};
 use crate::film::{Film, FilmError};
 use crate::integrate::IntegrateStatus;
 use crate::world::{Camera, FrameClock, Settings};
@@ -217,6 +217,9 @@ impl Simulation {
         self.world.resource_mut::<StageClock>().0.clear();
         self.schedule.run(&mut self.world);
         self.world.clear_trackers();
+        if let Some(first) = self.world.resource::<Surfaces>().dangling.first() {
+            return Err(RenderError::Dangling(first.clone()));
+        }
         let mut status = self.world.resource_mut::<IntegrateStatus>();
         let status = std::mem::take(&mut *status);
         if let Some(error) = status.error {

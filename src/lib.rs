@@ -1,9 +1,12 @@
 //! Kinora renders animated scenes by simulating light.
 
+pub mod build;
 pub mod color;
 pub mod description;
+pub mod extract;
 pub mod film;
 pub mod frame;
+pub mod integrate;
 pub mod math;
 pub mod output;
 pub mod sampling;

@@ -137,7 +137,7 @@ impl Job {
         if self.pending.is_empty() {
             return Ok(());
         }
-        let mut engine = Engine::new(&self.scene)?;
+        let mut engine = Engine::new(&self.scene);
         for &frame in &self.pending {
             self.control.samples_done.store(0, Ordering::Relaxed);
             self.control.rays.store(0, Ordering::Relaxed);

@@ -1,6 +1,6 @@
 //! Objects as a flat table of instances.
 
-use super::{FrameOrigin, SurfaceSlots};
+use super::{FrameOrigin, SurfaceSlots, Surfaces, spawn_order};
 use crate::math::{Aabb, MotionTransform};
 use crate::shape::Primitive;
 use crate::world::{
@@ -62,7 +62,7 @@ pub fn extract_meshes(
         return;
     }
     let mut found: Vec<(Entity, &Mesh)> = meshes.iter().collect();
-    found.sort_unstable_by_key(|(entity, _)| (entity.index_u32(), entity.generation()));
+    found.sort_unstable_by_key(|(entity, _)| spawn_order(*entity));
     table.list = found.iter().map(|(_, mesh)| mesh.data().clone()).collect();
     table.slots = found.iter().zip(0..).map(|((e, mesh), k)| (*e, (k, mesh.bounds()))).collect();
 }
@@ -99,6 +99,7 @@ type ObjectQuery<'w, 's> = Query<
 pub fn extract_instances(
     origin: Res<FrameOrigin>,
     slots: Res<SurfaceSlots>,
+    surfaces: Res<Surfaces>,
     objects: ObjectQuery,
     meshes: Res<Meshes>,
     moved: Query<Entity, (With<Shape>, Changed<ShutterMotion>)>,
@@ -118,7 +119,7 @@ pub fn extract_instances(
 ) {
     let gone = removed.0.read().count() + removed.1.read().count() + removed.2.read().count();
     let all = origin.is_changed()
-        || slots.is_changed()
+        || surfaces.is_changed()
         || !restructured.is_empty()
         || meshes.is_changed()
         || gone > 0;
@@ -131,12 +132,12 @@ pub fn extract_instances(
     let table = &mut *table;
     if all {
         let mut entities: Vec<Entity> = objects.iter().map(|object| object.0).collect();
-        entities.sort_unstable_by_key(|entity| (entity.index_u32(), entity.generation()));
+        entities.sort_unstable_by_key(|entity| spawn_order(*entity));
         let mut by_name: Vec<(&str, Entity)> = objects
             .iter()
             .map(|(entity, _, _, name, ..)| (name.map_or("", |name| name.as_str()), entity))
             .collect();
-        by_name.sort_unstable_by_key(|(name, e)| (*name, e.index_u32(), e.generation()));
+        by_name.sort_unstable_by_key(|(name, entity)| (*name, spawn_order(*entity)));
         let ids: EntityHashMap<u32> =
             by_name.into_iter().zip(1..).map(|((_, entity), id)| (entity, id)).collect();
         table.list.clear();
@@ -156,9 +157,11 @@ pub fn extract_instances(
                         geometry,
                         motion,
                         bounds,
-                        material: material
-                            .and_then(|m| slots.materials.get(&m).copied())
-                            .unwrap_or(NOTHING),
+                        material: match material.and_then(|m| slots.materials.get(&m)) {
+                            Some(slot) => *slot,
+                            None if emits => NOTHING,
+                            None => surfaces.default_material,
+                        },
                         emission: if emits { slots.emissions[&entity] } else { NOTHING },
                         object_id: ids[&entity],
                         hidden_from_camera: hidden,

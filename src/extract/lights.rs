@@ -1,7 +1,7 @@
 //! Lights without a shape as a table.
 
-use super::{FrameOrigin, NOTHING, SurfaceSlots};
-use crate::description::{Rgb, Value};
+use super::{FrameOrigin, NOTHING, SurfaceSlots, spawn_order};
+use crate::description::Rgb;
 use crate::math::MotionTransform;
 use crate::world::{EmissionFactor, Light, ShutterMotion};
 use bevy_ecs::prelude::*;
@@ -47,7 +47,7 @@ pub fn extract_lights(
             (entity, PunctualLight { light, motion: MotionTransform::new(&keys) })
         })
         .collect();
-    found.sort_unstable_by_key(|(entity, _)| (entity.index_u32(), entity.generation()));
+    found.sort_unstable_by_key(|(entity, _)| spawn_order(*entity));
     table.set_if_neq(PunctualLights(found.into_iter().map(|(_, light)| light).collect()));
 }
 
@@ -72,13 +72,5 @@ impl PunctualLight {
     /// Intensity of a point light, W·sr⁻¹ per channel.
     pub fn point_intensity(intensity: Option<Rgb>, power: Option<Rgb>) -> Rgb {
         intensity.or(power.map(|p| p / (4.0 * std::f32::consts::PI))).unwrap_or(Rgb::ZERO)
-    }
-
-    /// The texture of an environment map.
-    pub fn environment_map(&self) -> Option<u32> {
-        match self.light {
-            crate::description::Light::Sky { radiance: Value::Texture(texture), .. } => Some(texture),
-            _ => None,
-        }
     }
 }

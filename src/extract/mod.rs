@@ -38,3 +38,9 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
             .in_set(FrameSystems::Extract),
     );
 }
+
+/// The key by which tables order entities: that of spawning, as long as none was despawned; two
+/// living entities never share it.
+fn spawn_order(entity: Entity) -> u32 {
+    entity.index_u32()
+}

@@ -85,7 +85,8 @@ pub fn derive_requirements(
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
     }
-    let specular = used(&|m| surfaces.materials.is_specular(m));
+    let middle = glam::Vec2::splat(0.5);
+    let specular = used(&|m| !surfaces.materials.bsdf(m, middle, &mut 0.5).has_non_delta());
     if specular > 0 {
         require(Feature::Caustics, format!("{specular} mirrors or clear solids"));
         let points = lights

@@ -1,19 +1,43 @@
 //! Materials, textures and emissions as tables.
 
+use super::spawn_order;
 use crate::description::{EmissionStrength, Rgb, Value};
 use crate::shade::MaterialTable;
 use crate::world::{Emission, EmissionFactor, Material, Texture};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
-use std::convert::Infallible;
 
 /// What surfaces are made of and what they emit, by index.
-#[derive(Resource, Default)]
+#[derive(Resource)]
 pub struct Surfaces {
     /// Materials and textures.
     pub materials: MaterialTable,
     /// Emissions of shapes.
     pub emissions: Vec<SurfaceEmission>,
+    /// Index of the grey of objects which have no material and emit nothing.
+    pub default_material: u32,
+    /// What refers to an entity which is not what it should be, in words.
+    pub dangling: Vec<String>,
+}
+
+impl Default for Surfaces {
+    fn default() -> Self {
+        Self::new(Vec::new(), Vec::new(), Vec::new())
+    }
+}
+
+impl Surfaces {
+    fn new(
+        mut materials: Vec<crate::description::Material<u32>>,
+        textures: Vec<Texture>,
+        emissions: Vec<SurfaceEmission>,
+    ) -> Self {
+        let default_material = materials.len() as u32;
+        let grey = Value::Constant(Rgb::splat(0.5));
+        materials.push(crate::description::Material::Diffuse { albedo: grey });
+        let materials = MaterialTable::new(&materials, textures);
+        Self { materials, emissions, default_material, dangling: Vec::new() }
+    }
 }
 
 /// The emission of a shape.
@@ -63,17 +87,22 @@ pub fn extract_surfaces(
         return;
     }
     let texture_slots = in_spawn_order(textures.iter().map(|(entity, _)| entity));
-    // References to entities without the right component lead to a slot past the end, which shades
-    // as black; a description never contains one.
-    let mut texture_of =
-        |entity: Entity| Ok::<u32, Infallible>(slot(&texture_slots, entity));
+    let mut dangling = Vec::new();
+    let texture_of = |entity: Entity| {
+        texture_slots.get(&entity).copied().ok_or_else(|| format!("{entity} as a texture"))
+    };
     let material_slots = in_spawn_order(materials.iter().map(|(entity, _)| entity));
-    let mut material_of =
-        |entity: Entity| Ok::<u32, Infallible>(slot(&material_slots, entity));
+    let material_of = |entity: Entity| {
+        material_slots.get(&entity).copied().ok_or_else(|| format!("{entity} as a material"))
+    };
     let mut table: Vec<(u32, crate::description::Material<u32>)> = materials
         .iter()
         .map(|(entity, material)| {
-            let Ok(indexed) = material.clone().map_refs(&mut texture_of, &mut material_of);
+            let indexed = material.clone().map_refs(&mut { texture_of }, &mut { material_of });
+            let indexed = indexed.unwrap_or_else(|what| {
+                dangling.push(format!("the material of {entity} refers to {what}"));
+                crate::description::Material::Mirror { reflectance: Value::Constant(Rgb::ZERO) }
+            });
             (material_slots[&entity], indexed)
         })
         .collect();
@@ -88,19 +117,23 @@ pub fn extract_surfaces(
     let mut emitted: Vec<(u32, SurfaceEmission)> = emissions
         .iter()
         .map(|(entity, emission, factor)| {
-            let Ok(indexed) = emission.clone().map_ref(&mut texture_of);
-            let emission = SurfaceEmission {
-                strength: indexed.strength,
-                factor: factor.map_or(1.0, |f| f.0 as f32),
-                two_sided: indexed.two_sided,
+            let strength = match emission.clone().map_ref(&mut { texture_of }) {
+                Ok(indexed) => indexed.strength,
+                Err(what) => {
+                    dangling.push(format!("the emission of {entity} refers to {what}"));
+                    EmissionStrength::Power(Rgb::ZERO)
+                }
             };
+            let factor = factor.map_or(1.0, |f| f.0 as f32);
+            let emission =
+                SurfaceEmission { strength, factor, two_sided: emission.two_sided };
             (emission_slots[&entity], emission)
         })
         .collect();
     emitted.sort_unstable_by_key(|(slot, _)| *slot);
 
-    surfaces.materials = MaterialTable::new(&table, images);
-    surfaces.emissions = emitted.into_iter().map(|(_, emission)| emission).collect();
+    let emitted = emitted.into_iter().map(|(_, emission)| emission).collect();
+    *surfaces = Surfaces { dangling, ..Surfaces::new(table, images, emitted) };
     slots.set_if_neq(SurfaceSlots {
         materials: material_slots,
         textures: texture_slots,
@@ -111,10 +144,6 @@ pub fn extract_surfaces(
 /// Numbers entities in the order in which they were spawned.
 fn in_spawn_order(entities: impl Iterator<Item = Entity>) -> EntityHashMap<u32> {
     let mut entities: Vec<Entity> = entities.collect();
-    entities.sort_unstable_by_key(|entity| (entity.index_u32(), entity.generation()));
+    entities.sort_unstable_by_key(|entity| spawn_order(*entity));
     entities.into_iter().zip(0..).collect()
-}
-
-fn slot(slots: &EntityHashMap<u32>, entity: Entity) -> u32 {
-    slots.get(&entity).copied().unwrap_or(super::NOTHING)
 }
