@@ -1,1 +1,21 @@
 //! From a point on a surface to how it scatters light.
+//!
+//! ```text
+//! material (of the frame) + uv ── MaterialTable::bsdf ──> Bsdf ── sample, evaluate ──> wi, weight, pdf
+//! ```
+//!
+//! [`MaterialTable`] holds the materials and textures of a frame; at a point one of them becomes a
+//! [`Bsdf`], a small value which draws directions and evaluates pairs of them in the local shading
+//! frame. A new model is one file in `bsdf/` and one variant of [`Bsdf`].
+
+mod bsdf;
+mod material;
+mod metals;
+mod texture;
+
+pub use bsdf::{
+    Bsdf, BsdfSample, BsdfValue, Diffuse, Mirror, Principled, RoughConductor, RoughDielectric,
+    RoughPlastic, SmoothConductor, SmoothDielectric, SmoothPlastic, ThinGlass, TransportMode,
+};
+pub use material::{Interior, MaterialTable, material_cycle};
+pub use texture::{RenderTexture, average, color as texture_color, scalar as texture_scalar};

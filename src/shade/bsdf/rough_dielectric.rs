@@ -1,0 +1,191 @@
+//! Frosted glass: a dielectric interface with GGX roughness.
+//!
+//! Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces", EGSR; Pharr, Jakob,
+//! Humphreys 2023, *Physically Based Rendering*, 4th ed., section 9.7. With `η` the index on the
+//! side of `t` over that on the side of `o`, the normal of the facet which refracts `o` into `t` is
+//! `m ∝ ±(o + η t)`, and
+//!
+//! ```text
+//! f_t μ_t = (1 − F) D G₂ |o·m| |t·m| η² / (μ_o (o·m + η t·m)²)      (share of the power)
+//! ```
+//!
+//! which radiance divides by `η²` ([`TransportMode`]). One bounce loses `1 − E(μ)`, on either side its
+//! own table. It returns in four diffuse lobes of the form of Kulla and Conty 2017,
+//!
+//! ```text
+//! f_r = r (1 − E_o)(1 − E_i) / (π ℓ),          ℓ, ℓ' mean losses on the side of o and on the other
+//! f_t = t (1 − E_o)(1 − E'_t) / (π ℓ'),        r + t = 1 on each side,   t' = t ℓ / (η² ℓ')
+//! ```
+//!
+//! where the last relation is reciprocity. It leaves `t` free: the share which a smooth interface
+//! would transmit of diffuse light is taken, lowered where `t'` would exceed 1.
+
+use super::diffuse::cosine_direction;
+use super::energy::AlbedoAt;
+use super::fresnel::{dielectric, dielectric_reflectance};
+use super::ggx::{Ggx, reflect};
+use super::{BsdfSample, BsdfValue, TransportMode};
+use crate::description::Rgb;
+use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// A rough interface; light enters and leaves by the sign of `wo.z`.
+#[derive(Clone, Copy, Debug)]
+pub struct RoughDielectric<'t> {
+    /// Index inside (z < 0) over the index outside.
+    eta: f32,
+    /// Losses of a single bounce: from outside, from inside.
+    lost: AlbedoAt<'t, 2>,
+    /// Mean losses: from outside, from inside.
+    mean_lost: [f32; 2],
+    /// Share of the returned light which is transmitted: from outside, from inside.
+    returned_transmission: [f32; 2],
+}
+
+impl<'t> RoughDielectric<'t> {
+    /// The transmitted lobe is about `|η − 1| α` wide. Below this width a half vector of `o + η t`, which
+    /// carries the rounding error 10⁻⁷ of its terms, no longer resolves it (to 10⁻³), and the
+    /// interface is taken as smooth.
+    pub(crate) const SMOOTH_BELOW_WIDTH: f32 = 1e-4;
+
+    /// * `eta` — index inside over outside.
+    /// * `lost` — the table of single-bounce losses made for `eta`, at the width wanted.
+    /// * `average` — mean reflectance of the smooth interface from outside.
+    pub(crate) fn new(eta: f32, lost: AlbedoAt<'t, 2>, average: f32) -> Self {
+        let mean_lost = lost.average();
+        let ratio = eta * eta * mean_lost[1] / mean_lost[0]; // t / t'
+        let outside = (1.0 - average).min(ratio);
+        let inside = outside / ratio;
+        let returned_transmission =
+            if mean_lost.iter().all(|&l| l > 0.0) { [outside, inside] } else { [0.0; 2] };
+        Self { eta, lost, mean_lost, returned_transmission }
+    }
+
+    /// The side of `wo` (0 outside, 1 inside) and the relative index met from there.
+    #[inline]
+    fn side(&self, wo: Vec3) -> (usize, f32) {
+        if wo.z > 0.0 { (0, self.eta) } else { (1, 1.0 / self.eta) }
+    }
+
+    #[inline]
+    pub(super) fn sample(
+        &self,
+        wo: Vec3,
+        u_lobe: f32,
+        u: Vec2,
+        mode: TransportMode,
+    ) -> Option<BsdfSample> {
+        if wo.z == 0.0 {
+            return None;
+        }
+        let behind = wo.z < 0.0;
+        let (side, eta) = self.side(wo);
+        let wo = wo.with_z(wo.z.abs());
+        let lost = self.lost.value(wo.z)[side];
+        let wi = if u_lobe < lost {
+            let transmit = u_lobe < lost * self.returned_transmission[side];
+            let wi = cosine_direction(u);
+            if transmit { wi.with_z(-wi.z) } else { wi }
+        } else {
+            let u_lobe = (u_lobe - lost) / (1.0 - lost);
+            let m = Ggx { alpha: self.lost.alpha() }.sample_visible(wo, u);
+            let cos = wo.dot(m);
+            let interface = dielectric(cos, wo.cross(m).length_squared(), eta);
+            if u_lobe < interface.reflectance {
+                let wi = reflect(wo, m);
+                if wi.z <= 0.0 {
+                    return None;
+                }
+                wi
+            } else {
+                let wi = ((cos / eta - interface.mu_t) * m - wo / eta).normalize();
+                if wi.z >= 0.0 {
+                    return None;
+                }
+                wi
+            }
+        };
+        if wi.z == 0.0 {
+            return None;
+        }
+        let transmitted = wi.z < 0.0;
+        let value = self.evaluate_above(wo, wi, side, eta, mode);
+        let eta = if transmitted { eta } else { 1.0 };
+        BsdfSample::evaluated(wi, value, transmitted, eta).map(|sample| sample.turned(behind))
+    }
+
+    #[inline]
+    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3, mode: TransportMode) -> BsdfValue {
+        if wo.z == 0.0 || wi.z == 0.0 {
+            return BsdfValue::ZERO;
+        }
+        let (side, eta) = self.side(wo);
+        if wo.z > 0.0 {
+            self.evaluate_above(wo, wi, side, eta, mode)
+        } else {
+            self.evaluate_above(wo.with_z(-wo.z), wi.with_z(-wi.z), side, eta, mode)
+        }
+    }
+
+    /// Evaluates for `wo.z > 0`, on whichever side that is.
+    fn evaluate_above(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        side: usize,
+        eta: f32,
+        mode: TransportMode,
+    ) -> BsdfValue {
+        let lost = self.lost.value(wo.z)[side];
+        let t = self.returned_transmission[side];
+        let (value, pdf) = if wi.z > 0.0 {
+            let (value, pdf) = self.reflected_once(wo, wi, eta);
+            let returned = (1.0 - t) * self.returned(lost, wi.z, side);
+            (value + returned, (1.0 - lost) * pdf + lost * (1.0 - t) * wi.z * FRAC_1_PI)
+        } else {
+            let (value, pdf) = self.transmitted_once(wo, wi, eta);
+            let returned = t * self.returned(lost, -wi.z, 1 - side);
+            let value = (value + returned) * mode.transmission_factor(eta);
+            (value, (1.0 - lost) * pdf - lost * t * wi.z * FRAC_1_PI)
+        };
+        BsdfValue { f_cos: Rgb::splat(value), pdf }
+    }
+
+    /// `(1 − E_o)(1 − E_i) μ_i / (π ℓ_i)` for `wi` on the side `side`.
+    #[inline]
+    fn returned(&self, lost: f32, mu_i: f32, side: usize) -> f32 {
+        if self.mean_lost[side] > 0.0 {
+            lost * self.lost.value(mu_i)[side] * mu_i * FRAC_1_PI / self.mean_lost[side]
+        } else {
+            0.0
+        }
+    }
+
+    /// `f μ_i` and density of a single reflection.
+    #[inline]
+    fn reflected_once(&self, wo: Vec3, wi: Vec3, eta: f32) -> (f32, f32) {
+        let ggx = Ggx { alpha: self.lost.alpha() };
+        let m = (wo + wi).normalize_or_zero();
+        let f = dielectric_reflectance(wo.dot(m).clamp(0.0, 1.0), eta);
+        (f * ggx.d(m) * ggx.v(wo.z, wi.z) * wi.z, f * ggx.reflection_pdf(wo, m))
+    }
+
+    /// `f μ_i` (share of the power) and density of a single refraction.
+    #[inline]
+    fn transmitted_once(&self, wo: Vec3, wi: Vec3, eta: f32) -> (f32, f32) {
+        let ggx = Ggx { alpha: self.lost.alpha() };
+        let m = (wo + eta * wi).normalize_or_zero();
+        let m = if m.z < 0.0 { -m } else { m };
+        let (cos_o, cos_t) = (wo.dot(m), wi.dot(m));
+        // A facet seen from its back refracts nothing (or m is 0: no facet refracts so).
+        if cos_o <= 0.0 || cos_t >= 0.0 {
+            return (0.0, 0.0);
+        }
+        let transmitted = 1.0 - dielectric_reflectance(cos_o.min(1.0), eta);
+        let scale = cos_o + eta * cos_t;
+        let jacobian = eta * eta * -cos_t / (scale * scale);
+        let mu_t = -wi.z;
+        let f_cos = transmitted * ggx.d(m) * 4.0 * ggx.v(wo.z, mu_t) * mu_t * cos_o * jacobian;
+        (f_cos, transmitted * ggx.visible_pdf(wo, m) * jacobian)
+    }
+}

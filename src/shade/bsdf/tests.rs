@@ -1,0 +1,507 @@
+//! What holds for every model: densities, reciprocity, energy, and no wild numbers.
+
+use super::statistics::{Random, direction, even_points, integrate_cells, p_value, sidak_level};
+use super::*;
+use std::f32::consts::FRAC_1_PI;
+
+const MODES: [TransportMode; 2] = [TransportMode::Radiance, TransportMode::Importance];
+const COSINES: [f32; 4] = [1.0, 0.7, 0.1, 0.01];
+const GOLD: ConductorFresnel = ConductorFresnel::Complex {
+    eta: Rgb::new(0.223, 0.428, 1.335),
+    k: Rgb::new(3.204, 2.460, 1.872),
+};
+const WHITE_METAL: ConductorFresnel = ConductorFresnel::Schlick { f0: Rgb::ONE };
+
+fn lobe(alpha: f32) -> ReflectorLobe<'static> {
+    ReflectorLobe::new(reflector_table().at(alpha))
+}
+
+fn metal(fresnel: ConductorFresnel, alpha: f32) -> Bsdf<'static> {
+    Bsdf::RoughConductor(RoughConductor::new(fresnel, fresnel.average(), lobe(alpha)))
+}
+
+fn smooth_plastic(rho: Rgb, eta: f32) -> Bsdf<'static> {
+    Bsdf::SmoothPlastic(SmoothPlastic::new(rho, eta, dielectric_average(eta)))
+}
+
+fn principled(
+    base_color: Rgb,
+    metallic: f32,
+    alpha: Option<f32>,
+    transmission: f32,
+) -> Bsdf<'static> {
+    let parameters = PrincipledParameters { base_color, metallic, ior: 1.5, transmission };
+    Bsdf::Principled(Principled::new(&parameters, alpha.map(lobe)))
+}
+
+/// Tables which a test keeps for its BSDFs.
+struct Tables {
+    coats: Vec<(f32, f32, AlbedoTable<1>)>,
+    glasses: Vec<(f32, f32, AlbedoTable<2>)>,
+}
+
+impl Tables {
+    fn new(eta: f32, alphas: &[f32]) -> Self {
+        let one = |&alpha: &f32| (eta, alpha, Widths::One(alpha));
+        Self {
+            coats: alphas.iter().map(one).map(|(e, a, w)| (e, a, coat_table(e, w))).collect(),
+            glasses: alphas.iter().map(one).map(|(e, a, w)| (e, a, glass_table(e, w))).collect(),
+        }
+    }
+
+    fn plastics(&self, rho: Rgb) -> impl Iterator<Item = Bsdf<'_>> {
+        self.coats.iter().map(move |(eta, alpha, table)| {
+            Bsdf::RoughPlastic(RoughPlastic::new(rho, *eta, table.at(*alpha)))
+        })
+    }
+
+    fn glasses(&self) -> impl Iterator<Item = Bsdf<'_>> {
+        self.glasses.iter().map(|(eta, alpha, table)| {
+            let average = dielectric_average(*eta);
+            Bsdf::RoughDielectric(RoughDielectric::new(*eta, table.at(*alpha), average))
+        })
+    }
+}
+
+/// One of each model, and more where a parameter changes the lobes.
+fn zoo(tables: &Tables) -> Vec<Bsdf<'_>> {
+    let color = Rgb::new(0.9, 0.5, 0.1);
+    let mut all = vec![
+        Bsdf::Diffuse(Diffuse { albedo: color }),
+        Bsdf::Mirror(Mirror { reflectance: color }),
+        Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.5 }),
+        Bsdf::ThinGlass(ThinGlass { eta: 1.5, tint: color }),
+        Bsdf::SmoothConductor(SmoothConductor { fresnel: GOLD }),
+        metal(GOLD, 0.1),
+        metal(GOLD, 0.6),
+        metal(ConductorFresnel::Schlick { f0: color }, 1.0),
+        smooth_plastic(color, 1.5),
+        principled(color, 0.0, None, 0.0),
+        principled(color, 0.3, None, 0.6),
+        principled(color, 0.0, Some(0.25), 0.0),
+        principled(color, 0.4, Some(0.5), 0.0),
+        principled(color, 0.2, Some(0.3), 0.7),
+        principled(color, 1.0, Some(0.15), 0.0),
+    ];
+    all.extend(tables.plastics(color));
+    all.extend(tables.glasses());
+    all
+}
+
+/// Directions of the viewer at the cosines of [`COSINES`], from outside and from inside.
+fn viewers() -> impl Iterator<Item = Vec3> {
+    COSINES.into_iter().flat_map(|mu| [mu, -mu]).map(|mu| direction(f64::from(mu), 0.4))
+}
+
+/// Mean weight of a draw: the share of the light from `wo` which is scattered.
+fn furnace(bsdf: &Bsdf, wo: Vec3, mode: TransportMode, n: u32) -> Rgb {
+    let sum: glam::DVec3 = even_points(n)
+        .filter_map(|(u_lobe, u)| bsdf.sample(wo, u_lobe, u, mode))
+        .map(|sample| sample.weight.as_dvec3())
+        .sum();
+    (sum / f64::from(n)).as_vec3()
+}
+
+/// Pearson's χ² for every model, viewer and side; family level 0.01 after Šidák.
+#[test]
+fn samples_follow_their_pdf() {
+    let tables = Tables::new(1.5, &[0.1, 0.5]);
+    let zoo = zoo(&tables);
+    let bsdfs: Vec<_> = zoo.iter().filter(|bsdf| bsdf.has_non_delta()).collect();
+    let level = sidak_level(bsdfs.len() * 2 * COSINES.len());
+    let mut random = Random::new(11);
+    for bsdf in bsdfs {
+        for wo in viewers() {
+            let mode = TransportMode::Radiance;
+            let cells = integrate_cells(|wi| bsdf.evaluate(wo, wi, mode).pdf);
+            let p = p_value(&cells, 100_000, || {
+                bsdf.sample(wo, random.uniform(), random.square(), mode)
+                    .filter(|sample| !sample.delta)
+                    .map(|sample| sample.wi)
+            });
+            assert!(p > level, "wo = {wo}: p = {p:e} below {level:e} for {bsdf:?}");
+        }
+    }
+}
+
+/// The test above is able to fail: directions uniform in a box, normalised, are not cosine
+/// distributed; neither are those of another roughness.
+#[test]
+fn a_wrong_sampler_is_rejected() {
+    let mut random = Random::new(5);
+    let diffuse = Bsdf::Diffuse(Diffuse { albedo: Rgb::ONE });
+    let wo = Vec3::Z;
+    let mode = TransportMode::Radiance;
+    let cells = integrate_cells(|wi| diffuse.evaluate(wo, wi, mode).pdf);
+    let p = p_value(&cells, 20_000, || {
+        let u = random.square();
+        Some(Vec3::new(2.0 * u.x - 1.0, 2.0 * u.y - 1.0, random.uniform()).normalize())
+    });
+    assert!(p < 1e-9, "p = {p}");
+    let cells = integrate_cells(|wi| metal(GOLD, 0.30).evaluate(wo, wi, mode).pdf);
+    let other = metal(GOLD, 0.31);
+    let p = p_value(&cells, 100_000, || {
+        other.sample(wo, random.uniform(), random.square(), mode).map(|sample| sample.wi)
+    });
+    assert!(p < 1e-6, "p = {p}");
+}
+
+/// The integral of the density is the share of draws which are not deltas and not `None`:
+/// within 4 standard errors, and 1 for Lambert to the precision of the quadrature.
+#[test]
+fn densities_integrate_to_the_share_drawn() {
+    let tables = Tables::new(1.5, &[0.1, 0.5]);
+    let mode = TransportMode::Importance;
+    let n = 50_000;
+    for bsdf in zoo(&tables) {
+        for wo in viewers() {
+            let integral: f64 = integrate_cells(|wi| bsdf.evaluate(wo, wi, mode).pdf).iter().sum();
+            let mut random = Random::new(3);
+            let drawn = (0..n)
+                .filter_map(|_| bsdf.sample(wo, random.uniform(), random.square(), mode))
+                .filter(|sample| !sample.delta)
+                .count();
+            let share = drawn as f64 / f64::from(n);
+            let sigma = (integral * (1.0 - integral)).max(0.0).sqrt() / f64::from(n).sqrt();
+            assert!(
+                (share - integral).abs() < 4.0 * sigma + 1e-4,
+                "wo = {wo}: ∫pdf = {integral}, drawn {share}, {bsdf:?}"
+            );
+            if let Bsdf::Diffuse(_) = bsdf {
+                assert!((integral - 1.0).abs() < 1e-5, "∫pdf = {integral}");
+            }
+        }
+    }
+}
+
+/// The weight is `f cos / pdf` and the density the same from either call.
+#[test]
+fn sampling_and_evaluating_agree() {
+    let tables = Tables::new(1.5, &[0.1, 0.5]);
+    for bsdf in zoo(&tables) {
+        for wo in viewers() {
+            for mode in MODES {
+                for (u_lobe, u) in even_points(500) {
+                    let Some(sample) = bsdf.sample(wo, u_lobe, u, mode) else { continue };
+                    assert!((sample.wi.length() - 1.0).abs() < 1e-5, "{sample:?}");
+                    assert_eq!(sample.transmitted, (sample.wi.z < 0.0) != (wo.z < 0.0));
+                    if sample.delta {
+                        assert_eq!(sample.pdf, 0.0);
+                        continue;
+                    }
+                    let value = bsdf.evaluate(wo, sample.wi, mode);
+                    let weight = value.f_cos / value.pdf;
+                    assert!((value.pdf / sample.pdf - 1.0).abs() < 1e-4, "{value:?} {sample:?}");
+                    let relative = (weight - sample.weight).abs() / sample.weight;
+                    assert!(relative.max_element() < 1e-4, "{weight} {sample:?} {bsdf:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Oracle: Helmholtz reciprocity, `f(o, i) n_o⁻² = f(i, o) n_i⁻²` for radiance.
+#[test]
+fn every_model_is_reciprocal() {
+    let tables = Tables::new(1.5, &[0.1, 0.5]);
+    let mode = TransportMode::Radiance;
+    let mut random = Random::new(17);
+    for bsdf in zoo(&tables) {
+        let mut compared = 0;
+        for _ in 0..2000 {
+            let (o, i) = (random.direction(), random.direction());
+            let forward = bsdf.evaluate(o, i, mode).f_cos.x / i.z.abs();
+            let backward = bsdf.evaluate(i, o, mode).f_cos.x / o.z.abs();
+            let index = |z: f32| if z < 0.0 { 1.5 } else { 1.0_f32 };
+            let solid = matches!(bsdf, Bsdf::RoughDielectric(_));
+            let scale = if solid { (index(i.z) / index(o.z)).powi(2) } else { 1.0 };
+            if forward > 1e-6 {
+                let error = (forward * scale / backward - 1.0).abs();
+                assert!(error < 2e-3, "o = {o}, i = {i}: {forward} {backward} {bsdf:?}");
+                compared += 1;
+            }
+        }
+        assert_eq!(compared > 100, bsdf.has_non_delta(), "{bsdf:?}");
+    }
+}
+
+/// White furnace: what reflects everything returns everything, at every width and angle.
+#[test]
+fn white_materials_return_all_light() {
+    for alpha in [0.001, 0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0] {
+        let tables = Tables::new(1.5, &[alpha]);
+        let mut bsdfs = vec![metal(WHITE_METAL, alpha)];
+        bsdfs.extend(tables.plastics(Rgb::ONE));
+        for metallic in [0.0, 0.5, 1.0] {
+            for transmission in [0.0, 0.5, 1.0] {
+                bsdfs.push(principled(Rgb::ONE, metallic, Some(alpha), transmission));
+            }
+        }
+        for bsdf in bsdfs {
+            for mu in [1.0, 0.8, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001] {
+                let wo = direction(mu, 0.0);
+                let total = furnace(&bsdf, wo, TransportMode::Radiance, 20_000).x;
+                assert!((total - 1.0).abs() < 2e-3, "α = {alpha}, μ = {mu}: {total} {bsdf:?}");
+            }
+        }
+    }
+}
+
+/// Power is conserved at a rough interface of glass, from both sides, for indices below and above 1.
+#[test]
+fn rough_glass_passes_on_all_power() {
+    for eta in [0.75, 1.1, 1.33, 1.5, 2.4] {
+        let tables = Tables::new(eta, &[0.01, 0.05, 0.2, 0.5, 1.0]);
+        for bsdf in tables.glasses() {
+            for mu in [1.0, 0.7, 0.4, 0.1, 0.01, -0.01, -0.1, -0.4, -0.7, -1.0] {
+                let wo = direction(mu, 0.0);
+                let total = furnace(&bsdf, wo, TransportMode::Importance, 20_000).x;
+                assert!((total - 1.0).abs() < 5e-3, "η = {eta}, μ = {mu}: {total} {bsdf:?}");
+            }
+        }
+    }
+}
+
+/// Oracle: a smooth coat over a white base, thin glass without tint and the smooth principled
+/// white reflect exactly 1.
+#[test]
+fn smooth_white_materials_return_exactly_all_light() {
+    for bsdf in [
+        smooth_plastic(Rgb::ONE, 1.5),
+        smooth_plastic(Rgb::ONE, 1.0),
+        smooth_plastic(Rgb::ONE, 2.4),
+        Bsdf::ThinGlass(ThinGlass { eta: 1.5, tint: Rgb::ONE }),
+        Bsdf::Mirror(Mirror { reflectance: Rgb::ONE }),
+        Bsdf::SmoothConductor(SmoothConductor { fresnel: WHITE_METAL }),
+        principled(Rgb::ONE, 0.0, None, 0.0),
+        principled(Rgb::ONE, 0.5, None, 0.5),
+        principled(Rgb::ONE, 0.0, None, 1.0),
+    ] {
+        for mu in [1.0, 0.5, 0.1, 0.01] {
+            let total = furnace(&bsdf, direction(mu, 1.0), TransportMode::Radiance, 200_000).x;
+            assert!((total - 1.0).abs() < 2e-4, "μ = {mu}: {total} {bsdf:?}");
+            assert!((bsdf.albedo(direction(mu, 1.0)).x - 1.0).abs() < 1e-5);
+        }
+    }
+}
+
+/// Nothing returns more than it receives, and the albedo for the auxiliary layer is what a furnace
+/// measures. The metal's is approximate: it takes the Fresnel term at the mirror angle.
+#[test]
+fn the_albedo_is_what_a_furnace_measures() {
+    let tables = Tables::new(1.5, &[0.1, 0.5]);
+    for bsdf in zoo(&tables) {
+        for wo in viewers() {
+            let total = furnace(&bsdf, wo, TransportMode::Importance, 20_000);
+            let difference = (total - bsdf.albedo(wo)).abs().max_element();
+            let tolerance = if matches!(bsdf, Bsdf::RoughConductor(_)) { 0.12 } else { 5e-3 };
+            assert!(difference < tolerance, "{wo}: {total} {} {bsdf:?}", bsdf.albedo(wo));
+            assert!(total.max_element() < 1.005, "{wo}: {total} {bsdf:?}");
+        }
+    }
+}
+
+/// Oracle: a camera in glass of index 1.5 which looks out along the normal at radiance 1 reads
+/// `n² (1 − F) = 2.16`; the power that gets out of the glass is `1 − F = 0.96`.
+#[test]
+fn a_camera_in_glass_sees_the_outside_brighter() {
+    let tables = Tables::new(1.5, &[0.001]);
+    let smooth = Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.5 });
+    for (bsdf, tolerance) in [(smooth, 1e-3), (tables.glasses().next().unwrap(), 3e-3)] {
+        for (mode, expected) in [(TransportMode::Radiance, 2.16), (TransportMode::Importance, 0.96)]
+        {
+            let n = 20_000;
+            let out: f32 = even_points(n)
+                .filter_map(|(u_lobe, u)| bsdf.sample(-Vec3::Z, u_lobe, u, mode))
+                .filter(|sample| sample.transmitted)
+                .map(|sample| sample.weight.x)
+                .sum();
+            let out = out / n as f32;
+            assert!((out - expected).abs() < tolerance, "{mode:?}: {out}");
+        }
+    }
+}
+
+/// Radiance and power differ by `1/η²` in transmission and by nothing in reflection.
+#[test]
+fn radiance_and_power_differ_by_the_squared_index() {
+    let tables = Tables::new(1.5, &[0.5]);
+    let bsdf = tables.glasses().next().unwrap();
+    let mut random = Random::new(23);
+    for _ in 0..1000 {
+        let (o, i) = (random.direction(), random.direction());
+        let radiance = bsdf.evaluate(o, i, TransportMode::Radiance);
+        let power = bsdf.evaluate(o, i, TransportMode::Importance);
+        let factor = match (o.z > 0.0, i.z > 0.0) {
+            (true, false) => 1.0 / 2.25,
+            (false, true) => 2.25,
+            _ => 1.0,
+        };
+        assert_eq!(radiance.pdf, power.pdf);
+        assert!((radiance.f_cos.x - factor * power.f_cos.x).abs() <= 1e-5 * radiance.f_cos.x);
+    }
+}
+
+/// A lobe of probability zero is not chosen, not even by the number 0.
+#[test]
+fn a_lobe_without_weight_is_never_chosen() {
+    let black_base = smooth_plastic(Rgb::ZERO, 1.5);
+    let no_coat = smooth_plastic(Rgb::ONE, 1.0);
+    let no_glass = Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.0 });
+    let metal = principled(Rgb::ONE, 1.0, None, 1.0);
+    let wo = direction(0.6, 2.0);
+    for u_lobe in [0.0, 0.5, 1.0_f32.next_down()] {
+        for u in [Vec2::ZERO, Vec2::splat(0.4), Vec2::splat(1.0_f32.next_down())] {
+            let sample = |bsdf: &Bsdf| bsdf.sample(wo, u_lobe, u, TransportMode::Radiance);
+            assert!(sample(&black_base).is_none_or(|sample| sample.delta));
+            assert!(sample(&no_coat).is_none_or(|sample| !sample.delta));
+            assert!(sample(&no_glass).unwrap().transmitted);
+            assert!(sample(&metal).is_none_or(|sample| !sample.transmitted));
+        }
+    }
+}
+
+/// At the width where GGX gives way to a mirror the two agree: nearly all light within ten
+/// widths of the mirror direction, the same reflectance.
+#[test]
+fn the_narrowest_lobe_agrees_with_a_mirror() {
+    let rough = metal(GOLD, SMOOTH_BELOW_ALPHA);
+    let smooth = Bsdf::SmoothConductor(SmoothConductor { fresnel: GOLD });
+    let n = 20_000;
+    for mu in [1.0, 0.7, 0.1] {
+        let wo = direction(mu, 0.3);
+        let mode = TransportMode::Radiance;
+        let difference = furnace(&rough, wo, mode, n) - furnace(&smooth, wo, mode, 1);
+        assert!(difference.abs().max_element() < 2e-3, "μ = {mu}: {difference}");
+        let mirror = Vec3::new(-wo.x, -wo.y, wo.z);
+        let near = even_points(n)
+            .filter_map(|(u_lobe, u)| rough.sample(wo, u_lobe, u, mode))
+            .filter(|sample| sample.wi.distance(mirror) < 20.0 * SMOOTH_BELOW_ALPHA)
+            .count();
+        // Half vectors within 10 α of the normal hold 100/101 of D: directions within 20 α.
+        assert!(near as f64 > 0.985 * f64::from(n), "μ = {mu}: {near} of {n}");
+    }
+}
+
+/// Indices from vanishing to enormous, every angle, both sides: finite, and power is conserved.
+#[test]
+fn smooth_interfaces_of_any_index_conserve_power() {
+    for eta in [0.01, 0.5, 0.999_999, 1.0, 1.000_001, 1.5, 4.0, 100.0] {
+        let bsdf = Bsdf::SmoothDielectric(SmoothDielectric { eta });
+        for k in 0..=200 {
+            for z in [k as f32 / 200.0, -(k as f32) / 200.0, 1e-6, -1e-6, 1e-30, f32::MIN_POSITIVE]
+            {
+                let wo = direction(f64::from(z), 0.7).with_z(z);
+                let mut u = Random::new(k);
+                let Some(sample) =
+                    bsdf.sample(wo, u.uniform(), Vec2::ZERO, TransportMode::Importance)
+                else {
+                    assert_eq!(z, 0.0);
+                    continue;
+                };
+                assert_eq!(sample.weight, Rgb::ONE);
+                assert!(
+                    sample.wi.is_finite() && (sample.wi.length() - 1.0).abs() < 1e-5,
+                    "{sample:?}"
+                );
+                if eta == 1.0 {
+                    assert_eq!(sample.wi, -wo);
+                }
+            }
+        }
+    }
+}
+
+/// Oracle: Snell's law, in both directions.
+#[test]
+fn refraction_follows_snell() {
+    for eta in [1.33, 1.5, 2.4] {
+        let bsdf = Bsdf::SmoothDielectric(SmoothDielectric { eta });
+        for k in 1..90 {
+            let theta = f64::from(k).to_radians();
+            for side in [1.0, -1.0] {
+                let wo = direction(side * theta.cos(), 0.0);
+                let relative = if side > 0.0 { f64::from(eta) } else { 1.0 / f64::from(eta) };
+                let last = 1.0_f32.next_down(); // transmits wherever that is possible
+                let sample = bsdf.sample(wo, last, Vec2::ZERO, TransportMode::Importance).unwrap();
+                let sin_t = theta.sin() / relative;
+                assert_eq!(sample.transmitted, sin_t < 1.0);
+                if sample.transmitted {
+                    assert!((f64::from(sample.wi.x) + sin_t).abs() < 1e-6);
+                    assert!((f64::from(sample.eta) - relative).abs() < 1e-6);
+                }
+            }
+        }
+    }
+}
+
+/// A million random evaluations and draws: finite, never negative, unit directions.
+#[test]
+fn random_input_gives_no_wild_numbers() {
+    let edge = [0.0, f32::MIN_POSITIVE, 1e-30, 1e-6, 0.5, 1.0_f32.next_down()];
+    let mut random = Random::new(29);
+    let alphas = [SMOOTH_BELOW_ALPHA, 0.01, 0.3, 1.0];
+    let tables: Vec<_> = [0.3, 1.2, 1.5, 4.0, 100.0].map(|eta| Tables::new(eta, &alphas)).into();
+    let mut bsdfs: Vec<_> = tables.iter().flat_map(zoo).collect();
+    for alpha in alphas {
+        bsdfs.push(metal(GOLD, alpha));
+        bsdfs.push(principled(Rgb::ONE, 0.5, Some(alpha), 0.5));
+        bsdfs.push(principled(Rgb::ZERO, 0.0, Some(alpha), 0.0));
+    }
+    bsdfs.push(smooth_plastic(Rgb::ZERO, 1.0));
+    let pick = |random: &mut Random| {
+        if random.uniform() < 0.2 {
+            edge[(random.uniform() * edge.len() as f32) as usize]
+        } else {
+            random.uniform()
+        }
+    };
+    let near_horizon = |random: &mut Random| {
+        let d = random.direction();
+        let z = d.z * pick(random);
+        if random.uniform() < 0.3 {
+            direction(f64::from(z), f64::from(d.x) * 9.0).with_z(z)
+        } else {
+            d
+        }
+    };
+    let rounds = 1_000_000 / bsdfs.len();
+    for bsdf in &bsdfs {
+        for round in 0..rounds {
+            let (o, i) = (near_horizon(&mut random), near_horizon(&mut random));
+            let mode = MODES[round % 2];
+            let value = bsdf.evaluate(o, i, mode);
+            let fine = value.f_cos.is_finite() && value.f_cos.min_element() >= 0.0;
+            assert!(
+                fine && value.pdf.is_finite() && value.pdf >= 0.0,
+                "{o} {i} {value:?} {bsdf:?}"
+            );
+            let u = Vec2::new(pick(&mut random), pick(&mut random));
+            if let Some(sample) = bsdf.sample(o, pick(&mut random), u, mode) {
+                let fine = sample.weight.is_finite() && sample.weight.min_element() >= 0.0;
+                assert!(fine && sample.pdf.is_finite(), "{o} {sample:?} {bsdf:?}");
+                assert!((sample.wi.length() - 1.0).abs() < 1e-4, "{o} {sample:?} {bsdf:?}");
+            }
+        }
+    }
+}
+
+/// A BSDF stays small enough to be passed around.
+#[test]
+fn a_bsdf_is_at_most_96_bytes() {
+    assert!(size_of::<Bsdf>() <= 96, "{}", size_of::<Bsdf>());
+}
+
+/// Oracle: Lambert's `ρ cos θ / π`, and darkness on the other side.
+#[test]
+fn diffuse_is_lambertian_on_both_sides() {
+    let bsdf = Bsdf::Diffuse(Diffuse { albedo: Rgb::new(0.2, 0.5, 0.8) });
+    for z in [1.0, -1.0] {
+        let wo = direction(0.3 * z, 0.0);
+        let value = bsdf.evaluate(wo, direction(0.6 * z, 2.0), TransportMode::Radiance);
+        let expected = Rgb::new(0.2, 0.5, 0.8) * 0.6 * FRAC_1_PI;
+        assert!((value.f_cos - expected).abs().max_element() < 1e-7);
+        let behind = bsdf.evaluate(wo, direction(-0.6 * z, 2.0), TransportMode::Radiance);
+        assert_eq!(behind, BsdfValue::ZERO);
+    }
+}
