@@ -128,7 +128,7 @@ pub enum ToneMap {
     /// No curve but sRGB's own; values above 1 are clipped.
     #[default]
     Srgb,
-    /// Troy Sobotka's AgX: bright colours fade to white gently.
+    /// Troy Sobotka's `AgX`: bright colours fade to white gently.
     Agx,
     /// The fit of the ACES film curve by Narkowicz 2015.
     Aces,

@@ -21,6 +21,9 @@ pub enum Value<T, R> {
 
 impl<T, R> Value<T, R> {
     /// The same parameter with its reference replaced.
+    ///
+    /// # Errors
+    /// Whatever `f` returns.
     pub fn map_ref<S, E>(self, f: &mut impl FnMut(R) -> Result<S, E>) -> Result<Value<T, S>, E> {
         Ok(match self {
             Self::Constant(value) => Value::Constant(value),

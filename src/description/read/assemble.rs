@@ -9,7 +9,7 @@ use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
 use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
-use crate::description::diagnostic::{Diagnostics, suggestion};
+use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::{
     Clock, Encoding, Filter, ImageData, RenderSettings, SceneDescription, Texture, TriangleMesh,
 };
@@ -97,8 +97,12 @@ pub(super) fn assemble(
 
 /// The mistakes of each text together and in its order; those without a place at the end.
 fn in_order(mut mistakes: Diagnostics) -> Diagnostics {
-    let texts: Vec<_> =
-        mistakes.0.iter().flat_map(|d| &d.place).map(|p| p.source.clone()).collect();
+    let mut texts: Vec<Arc<SourceText>> = Vec::new();
+    for place in mistakes.0.iter().filter_map(|mistake| mistake.place.as_ref()) {
+        if !texts.iter().any(|text| Arc::ptr_eq(text, &place.source)) {
+            texts.push(place.source.clone());
+        }
+    }
     mistakes.0.sort_by_key(|mistake| {
         mistake.place.as_ref().map_or((usize::MAX, 0), |place| {
             let text = texts.iter().position(|text| Arc::ptr_eq(text, &place.source));
@@ -211,8 +215,8 @@ fn gather_names<'a>(
     }
     for entry in part.entries() {
         let written = &entry.source.text[entry.key.range()];
-        if !written.ends_with(['"', '#']) {
-            let message = "a name stands in double quotes";
+        if !written.ends_with(['"', '#']) || entry.key().is_empty() {
+            let message = "a name stands in double quotes and is not empty";
             report.error("scene::structure", entry.key_place(), &entry.path, message);
             continue;
         }

@@ -9,11 +9,16 @@ use crate::description::diagnostic::{Diagnostic, Diagnostics, Place, Severity, s
 use ron::error::SpannedError;
 use ron::extensions::Extensions;
 use serde::de::DeserializeOwned;
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
 
 /// The mistakes found so far: one for each place, the first one told.
 #[derive(Debug, Default)]
 pub(super) struct Report {
     pub(super) found: Diagnostics,
+    /// Where each place stands in `found`: by the address of its text, and its bytes.
+    known: HashMap<(usize, Range<usize>), usize>,
 }
 
 impl Report {
@@ -25,6 +30,8 @@ impl Report {
         label: &str,
         message: impl Into<String>,
     ) -> &mut Diagnostic {
+        // Every text outlives the report, so that an address stays that of one text.
+        let key = (Arc::as_ptr(&place.source).addr(), place.span.clone());
         let diagnostic = Diagnostic {
             severity: Severity::Error,
             code,
@@ -34,8 +41,7 @@ impl Report {
             related: Vec::new(),
             help: None,
         };
-        let known = self.found.0.iter().position(|other| other.place == diagnostic.place);
-        let index = known.unwrap_or_else(|| {
+        let index = *self.known.entry(key).or_insert_with(|| {
             self.found.0.push(diagnostic);
             self.found.0.len() - 1
         });
@@ -124,7 +130,7 @@ fn decode_field<T: DeserializeOwned>(name: &str, field: &Cursor) -> Result<(), M
 /// An error of `ron` with its bytes in the text of the source.
 struct Misread {
     code: ron::Error,
-    at: std::ops::Range<usize>,
+    at: Range<usize>,
 }
 
 impl Misread {

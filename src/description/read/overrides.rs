@@ -35,13 +35,17 @@ pub(super) fn apply(sources: &mut [Source], path: &str, value: &str, report: &mu
     let file = Arc::new(SourceText { name: "--set".to_owned(), text });
     let steps: Vec<&str> = path.split('.').collect();
     let whole = Place { source: file.clone(), span: 0..path.len() };
-    if let Err(error) = outline::parse(value) {
-        let shift = path.len() + 1;
-        let span = error.span.start + shift..error.span.end + shift;
-        let place = Place { source: file, span };
-        report.error("scene::syntax", place, path, error.message);
-        return;
-    }
+    let shift = path.len() + 1;
+    // Comments around the value stay out: they could swallow what follows.
+    let span = match outline::parse(value) {
+        Ok(node) => node.span.start as usize + shift..node.span.end as usize + shift,
+        Err(error) => {
+            let span = error.span.start + shift..error.span.end + shift;
+            let place = Place { source: file, span };
+            report.error("scene::syntax", place, path, error.message);
+            return;
+        }
+    };
     if steps[0] == "include" || !FIELDS.contains(&steps[0]) {
         let message = format!("there is no setting `{path}`");
         let fields = FIELDS.iter().copied().filter(|&field| field != "include");
@@ -59,11 +63,9 @@ pub(super) fn apply(sources: &mut [Source], path: &str, value: &str, report: &mu
     let rest = &steps[reached.steps..];
     let known = !MAPS.contains(&steps[0]) || reached.steps >= 2;
     let edit = match (rest, reached.insert) {
-        ([], _) => {
-            Some((reached.node.clone(), vec![verbatim(&file, path.len() + 1..file.text.len())]))
-        }
+        ([], _) => Some((reached.node.clone(), vec![verbatim(&file, span)])),
         (_, Some((at, comma))) if known => {
-            Some((at..at, inserted(&file, &steps, reached.steps, comma)))
+            Some((at..at, inserted(&file, &steps, reached.steps, comma, span)))
         }
         _ => None,
     };
@@ -145,7 +147,13 @@ fn verbatim(file: &Arc<SourceText>, range: Range<usize>) -> Piece {
 }
 
 /// The pieces `, a: (b: value)` for the steps from `done` on.
-fn inserted(file: &Arc<SourceText>, steps: &[&str], done: usize, comma: bool) -> Vec<Piece> {
+fn inserted(
+    file: &Arc<SourceText>,
+    steps: &[&str],
+    done: usize,
+    comma: bool,
+    value: Range<usize>,
+) -> Vec<Piece> {
     let equals: usize = steps.iter().map(|step| step.len() + 1).sum::<usize>() - 1;
     let glue =
         |text: &str| Piece { text: text.to_owned(), source: file.clone(), origin: 0..equals };
@@ -162,7 +170,7 @@ fn inserted(file: &Arc<SourceText>, steps: &[&str], done: usize, comma: bool) ->
         pieces.push(glue(": "));
         start += step.len() + 1;
     }
-    pieces.push(verbatim(file, equals + 1..file.text.len()));
+    pieces.push(verbatim(file, value));
     pieces.push(glue(&")".repeat(steps.len() - done - 1)));
     pieces.retain(|piece| !piece.text.is_empty());
     pieces

@@ -1,7 +1,7 @@
 //! A scene file as it is read: its text with the settings of the command line put in, its
 //! outline, and the way back from both to what the user wrote.
 
-use super::outline::{self, Entry, Kind, Node, Span, SyntaxError};
+use super::outline::{self, Kind, Node, Span, SyntaxError};
 use crate::description::diagnostic::{Place, SourceText};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -158,24 +158,34 @@ impl<'a> Cursor<'a> {
 
     /// The entries in order. The name of a variant becomes part of the path.
     pub(super) fn entries(&self) -> impl Iterator<Item = Cursor<'a>> + use<'a> {
-        let (source, name) = (self.source, self.name());
-        let transparent = name.is_empty() || name == "Some" || self.path.is_empty();
-        let base = if transparent { self.path.clone() } else { format!("{}.{name}", self.path) };
-        let positional = self.node.entries.len() > 1 || self.node.kind == Kind::List;
-        self.node.entries.iter().enumerate().map(move |(index, entry): (usize, &'a Entry)| {
-            let mut cursor =
-                Cursor { source, key: entry.key, node: &entry.value, path: base.clone() };
-            let step = match (entry.key.is_empty(), positional) {
-                (true, true) => index.to_string(),
-                (true, false) => String::new(),
-                (false, _) => cursor.key(),
-            };
-            if !step.is_empty() && !cursor.path.is_empty() {
-                cursor.path.push('.');
+        let this = self.clone();
+        (0..self.node.entries.len()).filter_map(move |index| this.index(index))
+    }
+
+    /// The entry at this index.
+    pub(super) fn index(&self, index: usize) -> Option<Cursor<'a>> {
+        let entry = self.node.entries.get(index)?;
+        let mut entry = Cursor {
+            source: self.source,
+            key: entry.key,
+            node: &entry.value,
+            path: self.path.clone(),
+        };
+        let mut step = |name: &str| {
+            if !entry.path.is_empty() && !name.is_empty() {
+                entry.path.push('.');
             }
-            cursor.path.push_str(&step);
-            cursor
-        })
+            entry.path.push_str(name);
+        };
+        if !self.path.is_empty() && self.name() != "Some" {
+            step(self.name());
+        }
+        if !entry.key.is_empty() {
+            step(&outline::unquoted(&self.source.text[entry.key.range()]));
+        } else if self.node.entries.len() > 1 || self.node.kind == Kind::List {
+            step(&index.to_string());
+        }
+        Some(entry)
     }
 
     /// The entry of this name, looked for through `Some(…)`.
@@ -184,11 +194,6 @@ impl<'a> Cursor<'a> {
             return self.entries().next()?.field(name);
         }
         self.entries().find(|entry| entry.key() == name)
-    }
-
-    /// The entry at this index.
-    pub(super) fn index(&self, index: usize) -> Option<Cursor<'a>> {
-        self.entries().nth(index)
     }
 
     /// The entry of this name, or this value itself where the field is left out.
