@@ -177,12 +177,12 @@ impl Simulation {
     /// # Errors
     /// When there is no camera, a reference dangles or the clock cannot run.
     pub fn prepare_frame(&mut self, frame: u32) -> Result<(), RenderError> {
-        let samples = std::mem::take(&mut self.world.resource_mut::<Settings>().0.samples);
-        let size = std::mem::replace(&mut self.world.resource_mut::<Settings>().0.size, (1, 1));
-        let outcome = self.run(frame, &RenderControl::default());
-        let mut settings = self.world.resource_mut::<Settings>();
-        (settings.0.samples, settings.0.size) = (samples, size);
-        outcome.map(|_| ())
+        let control = RenderControl::default();
+        control.cancel.store(true, Relaxed);
+        match self.run(frame, &control) {
+            Err(RenderError::Cancelled) | Ok(_) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     /// Renders a frame.
@@ -248,7 +248,9 @@ impl Simulation {
             return Err(RenderError::Clock(format!("{} frames per second", clock.fps)));
         }
         if !(open.is_finite() && close.is_finite() && open <= close) {
-            return Err(RenderError::Clock(format!("the shutter opens at {open} and closes at {close}")));
+            return Err(RenderError::Clock(format!(
+                "the shutter opens at {open} and closes at {close}"
+            )));
         }
         Ok(())
     }

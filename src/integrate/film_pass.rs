@@ -46,6 +46,9 @@ pub fn render_film(
 ) {
     let settings = &settings.0;
     *status = IntegrateStatus::default();
+    if control.cancel.load(Relaxed) {
+        return;
+    }
     let mut film = match Film::new(settings.size, &settings.layers) {
         Ok(film) => film,
         Err(error) => {
