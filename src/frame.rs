@@ -327,3 +327,26 @@ fn frame_schedule(world: &mut World) -> Schedule {
     integrate::install(world, &mut frame);
     frame
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every two systems which touch the same data are ordered.
+    #[test]
+    fn the_schedule_has_no_ambiguities() {
+        let mut simulation = Simulation::new();
+        simulation.schedule.initialize(&mut simulation.world).expect("no ambiguities");
+    }
+
+    /// The test above can fail: an unordered writer of the same resource is an error.
+    #[test]
+    fn an_unordered_conflict_is_found() {
+        fn meddle(mut settings: ResMut<Settings>) {
+            settings.0.samples += 1;
+        }
+        let mut simulation = Simulation::new();
+        simulation.schedule.add_systems(meddle);
+        assert!(simulation.schedule.initialize(&mut simulation.world).is_err());
+    }
+}
