@@ -82,7 +82,6 @@ pub struct SurfaceSlots {
 /// Rebuilds [`Surfaces`] when a texture, a material or an emission was added, changed or removed.
 ///
 /// Slots follow the order of the entities, which is that of spawning.
-#[expect(clippy::too_many_arguments, reason = "the signature lists what the table depends on")]
 pub fn extract_surfaces(
     changed: Query<
         (),

@@ -82,7 +82,7 @@ struct Vertex<'a> {
     bsdf: Bsdf<'a>,
 }
 
-impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, ABSORPTION> {
+impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORPTION> {
     /// The radiance which arrives along a camera ray.
     pub fn sample(
         &self,
@@ -174,8 +174,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             if depth >= self.roulette_depth {
                 let survival = (throughput * eta_scale).max_element().min(1.0);
                 let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
-                // The negation also ends a path whose throughput is NaN.
-                if !(u < survival) {
+                if u >= survival || survival.is_nan() {
                     break;
                 }
                 throughput /= survival;
