@@ -248,7 +248,9 @@ impl Simulation {
             return Err(RenderError::Clock(format!("{} frames per second", clock.fps)));
         }
         if !(open.is_finite() && close.is_finite() && open <= close) {
-            return Err(RenderError::Clock(format!("the shutter opens at {open} and closes at {close}")));
+            return Err(RenderError::Clock(format!(
+                "the shutter opens at {open} and closes at {close}"
+            )));
         }
         Ok(())
     }

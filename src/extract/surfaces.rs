@@ -108,8 +108,10 @@ pub fn extract_surfaces(
         .collect();
     table.sort_unstable_by_key(|(slot, _)| *slot);
     let table: Vec<_> = table.into_iter().map(|(_, material)| material).collect();
-    let mut images: Vec<(u32, Texture)> =
-        textures.iter().map(|(entity, texture)| (texture_slots[&entity], texture.clone())).collect();
+    let mut images: Vec<(u32, Texture)> = textures
+        .iter()
+        .map(|(entity, texture)| (texture_slots[&entity], texture.clone()))
+        .collect();
     images.sort_unstable_by_key(|(slot, _)| *slot);
     let images: Vec<Texture> = images.into_iter().map(|(_, texture)| texture).collect();
 
@@ -125,8 +127,7 @@ pub fn extract_surfaces(
                 }
             };
             let factor = factor.map_or(1.0, |f| f.0 as f32);
-            let emission =
-                SurfaceEmission { strength, factor, two_sided: emission.two_sided };
+            let emission = SurfaceEmission { strength, factor, two_sided: emission.two_sided };
             (emission_slots[&entity], emission)
         })
         .collect();

@@ -104,7 +104,8 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         loop {
             counters.rays += 1;
             let from_camera = met == 0;
-            let Some(hit) = self.scene.geometry.closest_hit(&ray, f64::INFINITY, from_camera) else {
+            let Some(hit) = self.scene.geometry.closest_hit(&ray, f64::INFINITY, from_camera)
+            else {
                 let light = self.infinite(&ray, arrival);
                 radiance += self.limited(throughput * light, depth);
                 break;
@@ -117,8 +118,8 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             let wo = -ray.d;
             if OPACITY && instance.material != NOTHING {
                 let opacity = materials.opacity(instance.material, surface.uv);
-                let passes = opacity < 1.0
-                    && sampler.one(dimensions + dimension::ROULETTE) >= opacity;
+                let passes =
+                    opacity < 1.0 && sampler.one(dimensions + dimension::ROULETTE) >= opacity;
                 if passes {
                     ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
                     continue;
@@ -211,14 +212,8 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         let radiance = lights.emitted(hit.instance, surface, wo);
         match arrival {
             Arrival::Drawn { from, pdf } if radiance != Rgb::ZERO => {
-                let light_pdf = lights.pdf(
-                    &from,
-                    hit.instance,
-                    hit.primitive,
-                    surface.p,
-                    surface.ng,
-                    time,
-                );
+                let light_pdf =
+                    lights.pdf(&from, hit.instance, hit.primitive, surface.p, surface.ng, time);
                 radiance * power_heuristic(pdf, light_pdf)
             }
             _ => radiance,
@@ -313,9 +308,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         let camera_from_render = scene.camera.motion.inverse_at(ray.time);
         let depth = (surface.p - camera_ray.ray.o.as_dvec3()).dot(camera_ray.axis);
         debug_assert!(camera_from_render.is_finite());
-        let albedo = bsdf.map_or(Rgb::ZERO, |bsdf| {
-            bsdf.albedo(surface.frame().to_local(-ray.d))
-        });
+        let albedo = bsdf.map_or(Rgb::ZERO, |bsdf| bsdf.albedo(surface.frame().to_local(-ray.d)));
         let film = |time: f32| scene.camera.project(scene.geometry.point_at(ray, hit, time), time);
         let motion = match (film(0.0), film(1.0)) {
             (Some(from), Some(to)) => (to - from).as_vec2(),

@@ -152,7 +152,8 @@ mod tests {
     #[test]
     fn a_single_bright_texel_is_found() {
         let (width, height) = (1024, 512);
-        let d = Piecewise2D::new(width, height, |x, y| if (x, y) == (700, 99) { 1e6 } else { 1e-3 });
+        let d =
+            Piecewise2D::new(width, height, |x, y| if (x, y) == (700, 99) { 1e6 } else { 1e-3 });
         let share = 1e6 / (1e6 + 1e-3 * (width * height - 1) as f64);
         let hits = (0..1000)
             .filter(|k| {

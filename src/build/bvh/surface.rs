@@ -41,14 +41,7 @@ impl SurfacePoint {
         let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
         let ns = if ns.is_finite() { ns } else { ng };
         let dpdu = forward.transform_vector3(local.dpdu).try_normalize().unwrap_or(DVec3::ZERO);
-        Self {
-            p,
-            p_error,
-            ng: ng.as_vec3(),
-            ns: ns.as_vec3(),
-            uv: local.uv,
-            dpdu: dpdu.as_vec3(),
-        }
+        Self { p, p_error, ng: ng.as_vec3(), ns: ns.as_vec3(), uv: local.uv, dpdu: dpdu.as_vec3() }
     }
 
     /// The shading frame: z is `ns`, x follows u.
@@ -66,9 +59,7 @@ impl SceneGeometry<'_> {
             Geometry::Primitive(primitive) => {
                 primitive.surface(inverse.transform_point3(ray.at(hit.t)), hit.primitive)
             }
-            Geometry::Mesh(mesh) => {
-                self.meshes[mesh as usize].surface(hit.primitive, hit.weights)
-            }
+            Geometry::Mesh(mesh) => self.meshes[mesh as usize].surface(hit.primitive, hit.weights),
         };
         SurfacePoint::new(&local, &forward, &inverse)
     }
@@ -76,7 +67,9 @@ impl SceneGeometry<'_> {
     /// Where the point of the surface that `ray` hit is at another time of the shutter.
     pub fn point_at(&self, ray: &Ray, hit: &Hit, time: f32) -> DVec3 {
         let motion = &self.instances[hit.instance as usize].motion;
-        motion.at(time).transform_point3(motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)))
+        motion
+            .at(time)
+            .transform_point3(motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)))
     }
 }
 

@@ -275,7 +275,8 @@ impl Slabs {
     fn new(ray: &LocalRay) -> Self {
         // A component of 0 would give 0·∞ = NaN for an origin on a face; the smallest normal number
         // of the same sign sends both faces far enough away instead.
-        let safe = |d: f64| if d.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE.copysign(d) } else { d };
+        let safe =
+            |d: f64| if d.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE.copysign(d) } else { d };
         Self { o: ray.o, inverse: ray.d.map(safe).recip() }
     }
 
@@ -365,7 +366,10 @@ mod tests {
                 assert!(seen.windows(2).all(|pair| pair[0] < pair[1]));
                 for (index, bounds) in boxes.iter().enumerate() {
                     if slabs.enter(bounds, t_max).is_some() {
-                        assert!(seen.binary_search(&(index as u32)).is_ok(), "ray {k}, box {index}");
+                        assert!(
+                            seen.binary_search(&(index as u32)).is_ok(),
+                            "ray {k}, box {index}"
+                        );
                     }
                 }
             }
@@ -398,7 +402,9 @@ mod tests {
             })
             .collect();
         let huge = Aabb { min: Vec3::splat(-1e38), max: Vec3::splat(1e38) };
-        for boxes in [vec![], vec![point], vec![point; 100_000], line, vec![huge, point, Aabb::EMPTY]] {
+        for boxes in
+            [vec![], vec![point], vec![point; 100_000], line, vec![huge, point, Aabb::EMPTY]]
+        {
             let tree = Bvh::build(&boxes, 4);
             assert!(tree.depth() <= STACK, "depth {}", tree.depth());
             let mut order = tree.order.clone();

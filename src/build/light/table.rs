@@ -6,7 +6,8 @@ use crate::build::bvh::{MeshTrees, TopLevel};
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
-    Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, SurfaceEmission, Surfaces,
+    Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, SurfaceEmission,
+    Surfaces,
 };
 use crate::sampling::Piecewise1D;
 use crate::shade::{MaterialTable, average};
