@@ -42,12 +42,17 @@ pub struct ConeOfSphere {
 }
 
 impl ConeOfSphere {
-    /// The cone of the sphere at `centre` from `p`; `None` from inside or on the sphere.
-    pub fn new(p: DVec3, centre: DVec3, radius: f64) -> Option<Self> {
+    /// The cone of the sphere at `centre` from `p`, which is known to within `error`, metres; `None`
+    /// from inside or on the sphere.
+    ///
+    /// A point counts as on the sphere up to a height of `f32::EPSILON` radii as well: directions to
+    /// the sphere are `f32`, and from there cannot tell its rim from the horizon.
+    pub fn new(p: DVec3, centre: DVec3, radius: f64, error: f64) -> Option<Self> {
         let to_centre = centre - p;
         let distance = to_centre.length();
         let sin_max = radius / distance;
-        if distance.is_nan() || sin_max >= 1.0 {
+        // The negation also catches NaN.
+        if !(distance - error > radius * (1.0 + f64::from(f32::EPSILON))) {
             return None;
         }
         // 1 − cos θ = sin²θ/(1 + cos θ) keeps its digits for a narrow cone.

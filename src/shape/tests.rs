@@ -178,7 +178,7 @@ fn sphere_lights_give_the_closed_form_irradiance() {
     for (tilt, expected) in [(0.0_f64, 0.349_065_9), (60.0, 0.174_532_9)] {
         let (sin, cos) = tilt.to_radians().sin_cos();
         let centre = DVec3::new(sin, 0.0, cos) * 3.0;
-        let cone = ConeOfSphere::new(DVec3::ZERO, centre, 1.0).expect("outside");
+        let cone = ConeOfSphere::new(DVec3::ZERO, centre, 1.0, 0.0).expect("outside");
         let e = mean(256, |u| {
             let (wi, normal) = sample_sphere(&cone, u);
             assert!(wi.dot(normal) < 1e-6, "the visible side faces the point");
@@ -187,7 +187,7 @@ fn sphere_lights_give_the_closed_form_irradiance() {
         assert!((e / expected - 1.0).abs() < 2e-5, "tilt {tilt}: {e}");
     }
     // A tiny, far sphere: E = πL·(R/d)²
-    let cone = ConeOfSphere::new(DVec3::ZERO, DVec3::Z, 1e-6).expect("outside");
+    let cone = ConeOfSphere::new(DVec3::ZERO, DVec3::Z, 1e-6, 0.0).expect("outside");
     assert!((1.0 / cone.pdf() / (std::f64::consts::PI * 1e-12) - 1.0).abs() < 1e-9);
 }
 

@@ -103,12 +103,15 @@ enum ShapeSampling {
 }
 
 impl ShapeSampling {
-    /// The best way for `primitive` under `map` as seen from `p`.
-    fn choose(primitive: Primitive, map: &DAffine3, p: DVec3) -> Self {
+    /// The best way for `primitive` under `map` as seen from `from`.
+    fn choose(primitive: Primitive, map: &DAffine3, from: &Receiver) -> Self {
         let m = &map.matrix3;
+        let p = from.p;
         match primitive {
+            // A point of the sphere itself may lie outside it by its rounding. Its cone would hold the
+            // side next to it alone, and none of what it sees across the inside.
             Primitive::Sphere if is_similarity(map) => {
-                ConeOfSphere::new(p, map.translation, m.x_axis.length())
+                ConeOfSphere::new(p, map.translation, m.x_axis.length(), from.p_error.length())
                     .map_or(Self::Area, |cone| Self::Cone { cone })
             }
             Primitive::Rectangle if is_perpendicular(m.x_axis, m.y_axis) => {
@@ -184,7 +187,7 @@ impl Lights<'_> {
         let map = object.motion.at(time);
         let (emitter, pdf) = match object.geometry {
             Geometry::Primitive(shape) => {
-                let pdf = match ShapeSampling::choose(shape, &map, from.p) {
+                let pdf = match ShapeSampling::choose(shape, &map, from) {
                     ShapeSampling::Cone { cone } => cone.pdf(),
                     ShapeSampling::Rectangle { sampler } => sampler.pdf(),
                     ShapeSampling::Area => {
@@ -252,7 +255,7 @@ impl Lights<'_> {
         let object = &self.geometry.instances[instance as usize];
         let Geometry::Primitive(shape) = object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(time);
-        let (local, face, pdf) = match ShapeSampling::choose(shape, &map, from.p) {
+        let (local, face, pdf) = match ShapeSampling::choose(shape, &map, from) {
             ShapeSampling::Cone { cone } => {
                 let (_, normal) = sample_sphere(&cone, u);
                 (inverse.transform_vector3(normal).normalize(), 0, Some(cone.pdf()))
