@@ -235,7 +235,7 @@ impl Simulation {
             non_finite: film.non_finite(),
             truncated_paths: status.counters.truncated,
             integrator: self.integrator(),
-            warnings: self.warnings(&film),
+            warnings: self.warnings(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
         Ok(RenderedFrame { film, report, world_to_camera })
@@ -283,26 +283,22 @@ impl Simulation {
         rebuilt
     }
 
-    fn integrator(&self) -> String {
+    /// The integrator which the settings ask for, and for `Auto` why it is taken.
+    pub fn integrator(&self) -> String {
         match self.world.resource::<Settings>().0.integrator {
             IntegratorChoice::Path => "Path".to_owned(),
-            IntegratorChoice::Auto => "Path (Auto: the only integrator so far)".to_owned(),
+            IntegratorChoice::Auto => "Path (Auto takes it: the only integrator so far)".to_owned(),
         }
     }
 
-    fn warnings(&self, film: &Film) -> Vec<String> {
+    /// What the user should know of the frame that was prepared or rendered last.
+    pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.world.resource::<Requirements>().warnings.clone();
         warnings.extend(self.world.resource::<ViewCamera>().warning.clone());
         if self.world.resource::<LightTable>().is_empty() {
             warnings.push(
                 "the scene has no light: give an entity an `emission` or a `light`".to_owned(),
             );
-        }
-        if film.non_finite() > 0 {
-            warnings.push(format!(
-                "{} samples were not finite numbers and were left out",
-                film.non_finite()
-            ));
         }
         warnings
     }
