@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 use kinora::description::{
     Channel, Encoding, ImageData, ImagePixels, Material, Metal, Texture, TextureFilter, Wrap,
 };
-use kinora::shade::{MaterialTable, RenderTexture, TransportMode, texture_color};
+use kinora::shade::{MaterialTable, RenderTexture, TransportMode, texture};
 use std::hint::black_box;
 use std::sync::Arc;
 
@@ -139,7 +139,7 @@ fn texture(c: &mut Criterion) {
     for (name, texture) in cases {
         group.bench_function(name, |b| {
             b.iter(|| {
-                black_box(&places).iter().map(|&uv| texture_color(&texture, uv)).sum::<Vec3>()
+                black_box(&places).iter().map(|&uv| texture::color(&texture, uv)).sum::<Vec3>()
             });
         });
     }

@@ -177,12 +177,12 @@ impl Simulation {
     /// # Errors
     /// When there is no camera, a reference dangles or the clock cannot run.
     pub fn prepare_frame(&mut self, frame: u32) -> Result<(), RenderError> {
-        let samples = std::mem::take(&mut self.world.resource_mut::<Settings>().0.samples);
-        let size = std::mem::replace(&mut self.world.resource_mut::<Settings>().0.size, (1, 1));
-        let outcome = self.run(frame, &RenderControl::default());
-        let mut settings = self.world.resource_mut::<Settings>();
-        (settings.0.samples, settings.0.size) = (samples, size);
-        outcome.map(|_| ())
+        let control = RenderControl::default();
+        control.cancel.store(true, Relaxed);
+        match self.run(frame, &control) {
+            Err(RenderError::Cancelled) | Ok(_) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     /// Renders a frame.
@@ -322,4 +322,27 @@ fn frame_schedule(world: &mut World) -> Schedule {
     build::install(world, &mut frame);
     integrate::install(world, &mut frame);
     frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every two systems which touch the same data are ordered.
+    #[test]
+    fn the_schedule_has_no_ambiguities() {
+        let mut simulation = Simulation::new();
+        simulation.schedule.initialize(&mut simulation.world).expect("no ambiguities");
+    }
+
+    /// The test above can fail: an unordered writer of the same resource is an error.
+    #[test]
+    fn an_unordered_conflict_is_found() {
+        fn meddle(mut settings: ResMut<Settings>) {
+            settings.0.samples += 1;
+        }
+        let mut simulation = Simulation::new();
+        simulation.schedule.add_systems(meddle);
+        assert!(simulation.schedule.initialize(&mut simulation.world).is_err());
+    }
 }

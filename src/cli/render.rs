@@ -90,7 +90,7 @@ impl Job {
                 |error| Failure::Usage(format!("the scene's clock: {error}; use --frames")),
             )?,
         };
-        let fingerprint = JobFingerprint::new(&scene, &arguments.scene.overrides);
+        let fingerprint = JobFingerprint::new(&scene);
         let is_pending = |&frame: &u32| {
             arguments.fresh
                 || !frame_is_complete(&folder, &name, frame, fingerprint.of_frame(frame))

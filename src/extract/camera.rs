@@ -172,7 +172,8 @@ pub fn extract_camera(
     mut view: ResMut<ViewCamera>,
 ) {
     let chosen = active.iter().min().or_else(|| cameras.iter().map(|c| c.0).min());
-    let Some((_, camera, motion, optics, look_at)) = chosen.and_then(|e| cameras.get(e).ok()) else {
+    let Some((_, camera, motion, optics, look_at)) = chosen.and_then(|e| cameras.get(e).ok())
+    else {
         return;
     };
     let Some(opening) = motion.keys.first() else { return };
@@ -244,7 +245,11 @@ mod tests {
 
     fn camera(fov_deg: f64, size: (u32, u32)) -> ViewCamera {
         let tan_half_fov = vec![(fov_deg.to_radians() * 0.5).tan()];
-        ViewCamera { size, projection: Projection::Perspective { tan_half_fov }, ..Default::default() }
+        ViewCamera {
+            size,
+            projection: Projection::Perspective { tan_half_fov },
+            ..Default::default()
+        }
     }
 
     /// Oracle: a point in front of a pinhole, by the similar triangles of its film.

@@ -1,12 +1,12 @@
 //! Objects as a flat table of instances.
 
 use super::{FrameOrigin, SurfaceSlots, Surfaces, spawn_order};
+use crate::description::TriangleMesh;
 use crate::math::{Aabb, MotionTransform};
 use crate::shape::Primitive;
 use crate::world::{
     Emission, HiddenFromCamera, MadeOf, Material, Mesh, Name, Shape, ShutterMotion,
 };
-use crate::description::TriangleMesh;
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DMat3, DVec3};
@@ -39,6 +39,8 @@ pub struct Instance {
     pub emission: u32,
     /// From 1, in the order of names.
     pub object_id: u32,
+    /// Whether its material or emission looks at uv.
+    pub needs_uv: bool,
     /// Whether camera rays pass through it.
     pub hidden_from_camera: bool,
 }
@@ -107,7 +109,14 @@ pub fn extract_instances(
         (),
         (
             With<Shape>,
-            Or<(Changed<Shape>, Changed<MadeOf>, Changed<Name>, Added<Emission>, Added<Material>, Added<HiddenFromCamera>)>,
+            Or<(
+                Changed<Shape>,
+                Changed<MadeOf>,
+                Changed<Name>,
+                Added<Emission>,
+                Added<Material>,
+                Added<HiddenFromCamera>,
+            )>,
         ),
     >,
     mut removed: (
@@ -143,7 +152,8 @@ pub fn extract_instances(
         table.list.clear();
         table.slots.clear();
         for entity in entities {
-            let Ok((_, shape, motion, _, made_of, own_material, emits, hidden)) = objects.get(entity)
+            let Ok((_, shape, motion, _, made_of, own_material, emits, hidden)) =
+                objects.get(entity)
             else {
                 continue;
             };
@@ -153,16 +163,19 @@ pub fn extract_instances(
                         Some(MadeOf(shared)) => Some(*shared),
                         None => own_material.then_some(entity),
                     };
+                    let material = match material.and_then(|m| slots.materials.get(&m)) {
+                        Some(slot) => *slot,
+                        None if emits => NOTHING,
+                        None => surfaces.default_material,
+                    };
+                    let emission = if emits { slots.emissions[&entity] } else { NOTHING };
                     Instance {
                         geometry,
                         motion,
                         bounds,
-                        material: match material.and_then(|m| slots.materials.get(&m)) {
-                            Some(slot) => *slot,
-                            None if emits => NOTHING,
-                            None => surfaces.default_material,
-                        },
-                        emission: if emits { slots.emissions[&entity] } else { NOTHING },
+                        material,
+                        emission,
+                        needs_uv: surfaces.needs_uv(material, emission),
                         object_id: ids[&entity],
                         hidden_from_camera: hidden,
                     }
@@ -178,7 +191,8 @@ pub fn extract_instances(
     }
     table.rewritten = 0;
     for entity in &moved {
-        let (Ok((_, shape, motion, ..)), Some(&slot)) = (objects.get(entity), table.slots.get(&entity))
+        let (Ok((_, shape, motion, ..)), Some(&slot)) =
+            (objects.get(entity), table.slots.get(&entity))
         else {
             continue;
         };
@@ -246,8 +260,7 @@ fn canonical(primitive: Primitive, scale: DVec3) -> (Geometry, DVec3, Aabb) {
 /// `r` the greatest `|q|`: the sagitta of its arc, and what the change of its radius adds on the way.
 /// Boxes around the keys, padded by that, hold the segment.
 fn shutter_bounds(bounds: &Aabb, keys: &[DAffine3], motion: &MotionTransform) -> Aabb {
-    let around_keys =
-        keys.iter().fold(Aabb::EMPTY, |all, key| all.union(bounds.transformed(key)));
+    let around_keys = keys.iter().fold(Aabb::EMPTY, |all, key| all.union(bounds.transformed(key)));
     let MotionTransform::Moving { keys: split } = motion else { return around_keys };
     let corners = bounds.corners().map(glam::Vec3::as_dvec3);
     let mut pad = 0.0_f64;

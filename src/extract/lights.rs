@@ -55,9 +55,10 @@ pub fn extract_lights(
 fn scaled(light: crate::description::Light<u32>, factor: f32) -> crate::description::Light<u32> {
     use crate::description::Light;
     match light {
-        Light::Point { intensity, power } => {
-            Light::Point { intensity: intensity.map(|i| i * factor), power: power.map(|p| p * factor) }
-        }
+        Light::Point { intensity, power } => Light::Point {
+            intensity: intensity.map(|i| i * factor),
+            power: power.map(|p| p * factor),
+        },
         Light::Spot { intensity, angle, blend } => {
             Light::Spot { intensity: intensity * factor, angle, blend }
         }

@@ -33,7 +33,14 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(PunctualLights::default());
     world.insert_resource(Requirements::default());
     frame.add_systems(
-        (extract_camera, extract_surfaces, extract_meshes, extract_instances, extract_lights, derive_requirements)
+        (
+            extract_camera,
+            extract_surfaces,
+            extract_meshes,
+            extract_instances,
+            extract_lights,
+            derive_requirements,
+        )
             .chain()
             .in_set(FrameSystems::Extract),
     );

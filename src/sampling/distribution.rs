@@ -32,9 +32,13 @@ impl Piecewise1D {
         let cells = cumulative.len() - 1;
         assert!(cells > 0, "a distribution needs at least one cell");
         if total > 0.0 {
-            cumulative.iter_mut().for_each(|c| *c /= total);
+            for c in &mut cumulative {
+                *c /= total;
+            }
         } else {
-            cumulative.iter_mut().enumerate().for_each(|(k, c)| *c = k as f64 / cells as f64);
+            for (k, c) in cumulative.iter_mut().enumerate() {
+                *c = k as f64 / cells as f64;
+            }
         }
         Self { cumulative, total }
     }
@@ -152,7 +156,8 @@ mod tests {
     #[test]
     fn a_single_bright_texel_is_found() {
         let (width, height) = (1024, 512);
-        let d = Piecewise2D::new(width, height, |x, y| if (x, y) == (700, 99) { 1e6 } else { 1e-3 });
+        let d =
+            Piecewise2D::new(width, height, |x, y| if (x, y) == (700, 99) { 1e6 } else { 1e-3 });
         let share = 1e6 / (1e6 + 1e-3 * (width * height - 1) as f64);
         let hits = (0..1000)
             .filter(|k| {

@@ -108,7 +108,7 @@ fn unit(x: u32) -> f32 {
     (x >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// A bijective mixing of 64 bits, the finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+/// A bijective mixing of 64 bits, the finaliser of `SplitMix64` (Steele, Lea and Flood 2014).
 fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -171,8 +171,7 @@ mod tests {
                         cells[cell] += 1;
                     }
                 }
-                let chi2: f64 =
-                    cells.iter().map(|&c| (f64::from(c) - 100.0).powi(2) / 100.0).sum();
+                let chi2: f64 = cells.iter().map(|&c| (f64::from(c) - 100.0).powi(2) / 100.0).sum();
                 let limit = chi2_upper_quantile(63, 5.4);
                 assert!(chi2 < limit, "dimensions {a}, {b}, seed {seed}: χ² = {chi2:.1}");
             }
@@ -189,10 +188,9 @@ mod tests {
         let rms = |f: Integrand, truth: f64, n: u32| {
             let sum: f64 = (0..200)
                 .map(|k| {
-                    let mean: f64 = (0..n)
-                        .map(|i| f(Sampler::new(5, 0, (k, 1), i).two(0)))
-                        .sum::<f64>()
-                        / f64::from(n);
+                    let mean: f64 =
+                        (0..n).map(|i| f(Sampler::new(5, 0, (k, 1), i).two(0))).sum::<f64>()
+                            / f64::from(n);
                     (mean - truth).powi(2)
                 })
                 .sum();

@@ -124,7 +124,8 @@ pub(crate) mod tests {
             let w = uniform_cone(u, 0.25);
             eighth((1.0 - w.z) * 4.0) * 8 + eighth(turn(w.y, w.x))
         });
-        for (name, chi2) in [("disk", disk), ("cosine", cosine), ("sphere", sphere), ("cone", cone)] {
+        for (name, chi2) in [("disk", disk), ("cosine", cosine), ("sphere", sphere), ("cone", cone)]
+        {
             assert!(chi2 < limit, "{name}: χ² = {chi2:.1}, limit {limit:.1}");
         }
         // A sampler which is wrong is found: a radius linear in u bunches in the centre.
@@ -173,8 +174,9 @@ pub(crate) mod tests {
     fn narrow_cones_keep_their_width() {
         let half = (0.265_f64).to_radians();
         let one_minus_cos = (half.sin().powi(2) / (1.0 + half.cos())) as f32;
-        let widest =
-            squares(10_000).map(|u| uniform_cone(u, one_minus_cos).truncate().length()).fold(0.0, f32::max);
+        let widest = squares(10_000)
+            .map(|u| uniform_cone(u, one_minus_cos).truncate().length())
+            .fold(0.0, f32::max);
         let rim = half.sin() as f32;
         assert!(widest <= rim * 1.000_01 && widest > rim * 0.999, "{widest} against {rim}");
     }

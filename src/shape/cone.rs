@@ -1,6 +1,8 @@
 //! The cone around y with radius 1 at y = −½ and its tip at y = ½. Faces: 0 the side, 1 the base.
 
-use super::{AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, cylinder, longitude, recentred};
+use super::{
+    AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, cylinder, longitude, recentred,
+};
 use crate::sampling::warp::square_to_disk;
 use glam::{DAffine3, DVec3, Vec2};
 use std::f64::consts::{PI, SQRT_2};
@@ -81,8 +83,7 @@ pub(super) fn sample(u: Vec2, world_from_shape: &DAffine3, capped: bool) -> Cano
     let side = side_probability(world_from_shape, capped);
     let x = f64::from(u.x);
     // Unrolled, side and base are both disks around the axis: radius r goes to height ½ − r.
-    let (x, on_side) =
-        if x < side { (x / side, true) } else { ((x - side) / (1.0 - side), false) };
+    let (x, on_side) = if x < side { (x / side, true) } else { ((x - side) / (1.0 - side), false) };
     let disk = square_to_disk(Vec2::new((x as f32).min(1.0), u.y)).as_dvec2();
     let height = if on_side { 0.5 - disk.length() } else { -0.5 };
     let p = DVec3::new(disk.x, height, disk.y);

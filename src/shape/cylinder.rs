@@ -1,8 +1,6 @@
 //! The cylinder of radius 1 around y from −½ to ½. Faces: 0 the side, 1 the lower, 2 the upper end.
 
-use super::{
-    AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, longitude, recentred,
-};
+use super::{AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, longitude, recentred};
 use crate::sampling::warp::square_to_disk;
 use glam::{DAffine3, DVec3, Vec2};
 use std::f64::consts::{PI, TAU};

@@ -21,10 +21,11 @@ pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
     (t > 0.0 && t < t_max).then_some(LocalHit { t, face: 0 })
 }
 
-pub(super) fn surface(p: DVec3) -> LocalSurface {
+pub(super) fn surface(p: DVec3, needs_uv: bool) -> LocalSurface {
     let p = p.normalize();
-    let v = 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI;
-    LocalSurface::smooth(p, p, (longitude(p), v), DVec3::new(p.z, 0.0, -p.x))
+    let uv =
+        if needs_uv { (longitude(p), 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI) } else { (0.0, 0.0) };
+    LocalSurface::smooth(p, p, uv, DVec3::new(p.z, 0.0, -p.x))
 }
 
 pub(super) fn sample(u: Vec2) -> CanonicalPoint {
@@ -41,12 +42,17 @@ pub struct ConeOfSphere {
 }
 
 impl ConeOfSphere {
-    /// The cone of the sphere at `centre` from `p`; `None` from inside or on the sphere.
-    pub fn new(p: DVec3, centre: DVec3, radius: f64) -> Option<Self> {
+    /// The cone of the sphere at `centre` from `p`, which is known to within `error`, metres; `None`
+    /// from inside or on the sphere.
+    ///
+    /// A point counts as on the sphere up to a height of `f32::EPSILON` radii as well: directions to
+    /// the sphere are `f32`, and from there cannot tell its rim from the horizon.
+    pub fn new(p: DVec3, centre: DVec3, radius: f64, error: f64) -> Option<Self> {
         let to_centre = centre - p;
         let distance = to_centre.length();
         let sin_max = radius / distance;
-        if distance.is_nan() || sin_max >= 1.0 {
+        // The negation also catches NaN.
+        if !(distance - error > radius * (1.0 + f64::from(f32::EPSILON))) {
             return None;
         }
         // 1 − cos θ = sin²θ/(1 + cos θ) keeps its digits for a narrow cone.

@@ -54,7 +54,7 @@ fn the_hit_is_where_the_ray_first_crosses_the_surface() {
             }
             let Some(hit) = hit else { continue };
             hits += 1;
-            let surface = shape.surface(ray.at(hit.t), hit.face);
+            let surface = shape.surface(ray.at(hit.t), hit.face, true);
             assert!((surface.p - ray.at(hit.t)).length() < 1e-11, "{shape:?}: {ray:?}");
             let n = surface.ng.normalize();
             assert!(!inside(shape, surface.p + n * 1e-9), "{shape:?}: the normal points outwards");
@@ -80,7 +80,7 @@ fn degenerate_rays_do_not_make_nan() {
                         }
                         if let Some(hit) = shape.intersect(&LocalRay { o, d }, 1e9) {
                             assert!(hit.t > 0.0 && hit.t < 1e9, "{shape:?} {o} {d}");
-                            let s = shape.surface(o + d * hit.t, hit.face);
+                            let s = shape.surface(o + d * hit.t, hit.face, true);
                             assert!(s.ng.is_finite() && s.uv.is_finite(), "{shape:?} {o} {d}");
                         }
                     }
@@ -109,7 +109,8 @@ fn far_spheres_keep_their_entry_point() {
 #[test]
 fn a_huge_sphere_underfoot_is_met_where_it_should_be() {
     let r = 1e6;
-    let ray = LocalRay { o: DVec3::new(0.0, (r + 1.0) / r, 0.0), d: DVec3::new(0.6, -0.8, 0.0) / r };
+    let ray =
+        LocalRay { o: DVec3::new(0.0, (r + 1.0) / r, 0.0), d: DVec3::new(0.6, -0.8, 0.0) / r };
     let t = Primitive::Sphere.intersect(&ray, 1e30).expect("aimed at it").t;
     let (b, c) = (-1.6 * (r + 1.0), 2.0 * r + 1.0);
     let expected = 2.0 * c / (-b + (b * b - 4.0 * c).sqrt());
@@ -155,7 +156,7 @@ fn points_are_drawn_on_the_surface() {
         for k in 0..500 {
             let u = Sampler::new(3, 0, (k, 0), 0).two(0);
             let point = shape.sample(u, &m).expect("finite area");
-            let surface = shape.surface(point.p, point.face);
+            let surface = shape.surface(point.p, point.face, true);
             assert!((surface.p - point.p).length() < 1e-6, "{shape:?}");
             let pdf = shape.pdf_area(point.face, &m);
             assert!((pdf / point.pdf_area - 1.0).abs() < 1e-12, "{shape:?}: {pdf}");
@@ -177,7 +178,7 @@ fn sphere_lights_give_the_closed_form_irradiance() {
     for (tilt, expected) in [(0.0_f64, 0.349_065_9), (60.0, 0.174_532_9)] {
         let (sin, cos) = tilt.to_radians().sin_cos();
         let centre = DVec3::new(sin, 0.0, cos) * 3.0;
-        let cone = ConeOfSphere::new(DVec3::ZERO, centre, 1.0).expect("outside");
+        let cone = ConeOfSphere::new(DVec3::ZERO, centre, 1.0, 0.0).expect("outside");
         let e = mean(256, |u| {
             let (wi, normal) = sample_sphere(&cone, u);
             assert!(wi.dot(normal) < 1e-6, "the visible side faces the point");
@@ -186,7 +187,7 @@ fn sphere_lights_give_the_closed_form_irradiance() {
         assert!((e / expected - 1.0).abs() < 2e-5, "tilt {tilt}: {e}");
     }
     // A tiny, far sphere: E = πL·(R/d)²
-    let cone = ConeOfSphere::new(DVec3::ZERO, DVec3::Z, 1e-6).expect("outside");
+    let cone = ConeOfSphere::new(DVec3::ZERO, DVec3::Z, 1e-6, 0.0).expect("outside");
     assert!((1.0 / cone.pdf() / (std::f64::consts::PI * 1e-12) - 1.0).abs() < 1e-9);
 }
 
@@ -256,9 +257,8 @@ fn shared_edges_and_vertices_are_watertight() {
         let target = if next() < 0.2 { centre } else { centre.lerp(rim[spoke], along) };
         let o = random_vector(&mut next) * 6.0 + DVec3::Z * 5.0;
         let test = TriangleTest::new(&LocalRay { o, d: target.as_dvec3() - o });
-        let hit = (0..7).any(|k| {
-            test.intersect([centre, rim[k], rim[(k + 1) % 7]], f64::INFINITY).is_some()
-        });
+        let hit = (0..7)
+            .any(|k| test.intersect([centre, rim[k], rim[(k + 1) % 7]], f64::INFINITY).is_some());
         // The target itself is rounded to f32 and may lie beyond the outer end of a spoke.
         assert!(hit || along > 0.999_99, "ray {k} slips through");
     }

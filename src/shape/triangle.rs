@@ -29,11 +29,7 @@ impl TriangleTest {
         };
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let d = ray.d;
-        Self {
-            o: ray.o,
-            axes: [x, y, z],
-            shear: DVec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]),
-        }
+        Self { o: ray.o, axes: [x, y, z], shear: DVec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]) }
     }
 
     /// The hit with `0 < t < t_max` and the weights of the second and third vertex.

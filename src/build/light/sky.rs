@@ -69,13 +69,23 @@ impl SkyLight {
     }
 
     /// Radiance from the unit direction `wi` of render space.
-    pub fn radiance(&self, wi: Vec3, render_from_light: &DAffine3, materials: &MaterialTable) -> Rgb {
+    pub fn radiance(
+        &self,
+        wi: Vec3,
+        render_from_light: &DAffine3,
+        materials: &MaterialTable,
+    ) -> Rgb {
         self.radiance_local(to_light(render_from_light, wi), materials)
     }
 
     /// Draws a direction towards the sky and its density per unit solid angle. `normal` is where the
     /// receiving surface faces: a constant sky is drawn by the cosine around it.
-    pub fn sample(&self, normal: Vec3, u: Vec2, render_from_light: &DAffine3) -> Option<(Vec3, f32)> {
+    pub fn sample(
+        &self,
+        normal: Vec3,
+        u: Vec2,
+        render_from_light: &DAffine3,
+    ) -> Option<(Vec3, f32)> {
         match &self.map {
             None => {
                 let local = cosine_hemisphere(u);

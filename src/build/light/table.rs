@@ -6,10 +6,11 @@ use crate::build::bvh::{MeshTrees, TopLevel};
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
-    Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, SurfaceEmission, Surfaces,
+    Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, SurfaceEmission,
+    Surfaces,
 };
 use crate::sampling::Piecewise1D;
-use crate::shade::{MaterialTable, average};
+use crate::shade::{MaterialTable, texture};
 use crate::shape::{AreaFactor, triangle_area};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -230,7 +231,7 @@ fn mean_color(value: &Value<Rgb, u32>, materials: &MaterialTable) -> Rgb {
     match value {
         Value::Constant(color) => *color,
         Value::Texture(index) => {
-            materials.textures().get(*index as usize).map_or(Rgb::ZERO, average)
+            materials.textures().get(*index as usize).map_or(Rgb::ZERO, texture::average)
         }
     }
 }

@@ -103,12 +103,15 @@ enum ShapeSampling {
 }
 
 impl ShapeSampling {
-    /// The best way for `primitive` under `map` as seen from `p`.
-    fn choose(primitive: Primitive, map: &DAffine3, p: DVec3) -> Self {
+    /// The best way for `primitive` under `map` as seen from `from`.
+    fn choose(primitive: Primitive, map: &DAffine3, from: &Receiver) -> Self {
         let m = &map.matrix3;
+        let p = from.p;
         match primitive {
+            // A point of the sphere itself may lie outside it by its rounding. Its cone would hold the
+            // side next to it alone, and none of what it sees across the inside.
             Primitive::Sphere if is_similarity(map) => {
-                ConeOfSphere::new(p, map.translation, m.x_axis.length())
+                ConeOfSphere::new(p, map.translation, m.x_axis.length(), from.p_error.length())
                     .map_or(Self::Area, |cone| Self::Cone { cone })
             }
             Primitive::Rectangle if is_perpendicular(m.x_axis, m.y_axis) => {
@@ -151,7 +154,8 @@ impl Lights<'_> {
             Emitter::Punctual(index) => self.sample_punctual(index, from, time, u),
         }?;
         sample.pdf *= probability;
-        (sample.pdf > 0.0 && sample.pdf.is_finite() && sample.radiance != Rgb::ZERO).then_some(sample)
+        (sample.pdf > 0.0 && sample.pdf.is_finite() && sample.radiance != Rgb::ZERO)
+            .then_some(sample)
     }
 
     /// The radiance which a surface emits from a point towards the unit direction `wo`.
@@ -166,7 +170,15 @@ impl Lights<'_> {
 
     /// The density with which [`Lights::sample`] draws the direction from `from` to a point `q` of an
     /// emitting surface with unit normal `n`.
-    pub fn pdf(&self, from: &Receiver, instance: u32, primitive: u32, q: DVec3, n: Vec3, time: f32) -> f32 {
+    pub fn pdf(
+        &self,
+        from: &Receiver,
+        instance: u32,
+        primitive: u32,
+        q: DVec3,
+        n: Vec3,
+        time: f32,
+    ) -> f32 {
         let first = self.table.first_of_instance[instance as usize];
         if first == NOTHING {
             return 0.0;
@@ -175,21 +187,22 @@ impl Lights<'_> {
         let map = object.motion.at(time);
         let (emitter, pdf) = match object.geometry {
             Geometry::Primitive(shape) => {
-                let pdf = match ShapeSampling::choose(shape, &map, from.p) {
+                let pdf = match ShapeSampling::choose(shape, &map, from) {
                     ShapeSampling::Cone { cone } => cone.pdf(),
                     ShapeSampling::Rectangle { sampler } => sampler.pdf(),
                     ShapeSampling::Area => {
                         let local = map.inverse().transform_point3(q);
-                        let normal = shape.surface(local, primitive).ng;
+                        let normal = shape.surface(local, primitive, false).ng;
                         let area = AreaFactor::new(&map.matrix3).at(normal);
                         area_to_solid_angle(shape.pdf_area(primitive, &map) / area, q - from.p, n)
                     }
                 };
                 (first, pdf)
             }
-            Geometry::Mesh(_) => {
-                (first + primitive, triangle_pdf(from.p, self.triangle(instance, primitive, &map), q))
-            }
+            Geometry::Mesh(_) => (
+                first + primitive,
+                triangle_pdf(from.p, self.triangle(instance, primitive, &map), q),
+            ),
         };
         self.table.probability(emitter) * pdf as f32
     }
@@ -232,11 +245,17 @@ impl Lights<'_> {
         corners.map(|corner| map.transform_point3(corner.as_dvec3()))
     }
 
-    fn sample_shape(&self, instance: u32, from: &Receiver, time: f32, u: Vec2) -> Option<LightSample> {
+    fn sample_shape(
+        &self,
+        instance: u32,
+        from: &Receiver,
+        time: f32,
+        u: Vec2,
+    ) -> Option<LightSample> {
         let object = &self.geometry.instances[instance as usize];
         let Geometry::Primitive(shape) = object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(time);
-        let (local, face, pdf) = match ShapeSampling::choose(shape, &map, from.p) {
+        let (local, face, pdf) = match ShapeSampling::choose(shape, &map, from) {
             ShapeSampling::Cone { cone } => {
                 let (_, normal) = sample_sphere(&cone, u);
                 (inverse.transform_vector3(normal).normalize(), 0, Some(cone.pdf()))
@@ -250,7 +269,7 @@ impl Lights<'_> {
                 (point.p, point.face, None)
             }
         };
-        let canonical = shape.surface(local, face);
+        let canonical = shape.surface(local, face, object.needs_uv);
         let surface = SurfacePoint::new(&canonical, &map, &inverse);
         let pdf = pdf.unwrap_or_else(|| {
             let area = AreaFactor::new(&map.matrix3).at(canonical.ng);
@@ -292,7 +311,13 @@ impl Lights<'_> {
         Some(LightSample { wi, radiance, pdf: pdf as f32, delta: false, end })
     }
 
-    fn sample_punctual(&self, index: u32, from: &Receiver, time: f32, u: Vec2) -> Option<LightSample> {
+    fn sample_punctual(
+        &self,
+        index: u32,
+        from: &Receiver,
+        time: f32,
+        u: Vec2,
+    ) -> Option<LightSample> {
         let light = &self.punctual[index as usize];
         let map = light.motion.at(time);
         let at_point = |intensity: Rgb| {
@@ -317,7 +342,9 @@ impl Lights<'_> {
                 let axis = -axis_of(&map);
                 let end = ShadowEnd::Infinity;
                 Some(match DistantCone::new(angle) {
-                    None => LightSample { wi: axis, radiance: irradiance, pdf: 1.0, delta: true, end },
+                    None => {
+                        LightSample { wi: axis, radiance: irradiance, pdf: 1.0, delta: true, end }
+                    }
                     Some(cone) => {
                         let local = uniform_cone(u, cone.one_minus_cos_max);
                         let wi = crate::math::Frame::from_z(axis).from_local(local);
