@@ -1,6 +1,8 @@
 //! The scenes of the repository, and the commands that the documents show with them.
 
-use kinora::description::{LoadOptions, load_scene};
+use kinora::description::{
+    Clock, LoadOptions, RenderSettings, SceneDescription, load_scene, parse_scene_str,
+};
 use kinora::frame::Simulation;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -92,4 +94,46 @@ fn the_examples_that_are_named_exist() {
             assert!(exists, "{document} names the example {name}");
         }
     }
+}
+
+/// A scene of these fields, with a camera and a lamp.
+fn scene_with(fields: &str) -> SceneDescription {
+    let lamp = r#""lamp": (shape: Sphere(), emission: Radiance(1))"#;
+    let text = format!(r#"({fields} entities: {{"eye": (camera: ()), {lamp}}})"#);
+    let scene = parse_scene_str("defaults.ron", &text, None, &LoadOptions::default());
+    scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)))
+}
+
+/// `field: default, …` of the table below a heading of the scene format.
+fn documented_defaults(format: &str, heading: &str) -> String {
+    let section = format.split(&format!("\n## {heading}\n")).nth(1).expect("the heading exists");
+    let section = section.split("\n## ").next().expect("at least one piece");
+    let rows = section.lines().filter(|line| line.starts_with("| `"));
+    let cells = rows.map(|row| row.split('|').map(|cell| cell.trim().trim_matches('`')));
+    let fields = cells.filter_map(|mut cells| {
+        let (name, default) = (cells.nth(1)?, cells.next()?);
+        (default != "off").then(|| format!("{name}: {default}"))
+    });
+    fields.collect::<Vec<_>>().join(", ")
+}
+
+#[test]
+fn the_scene_format_tells_the_true_defaults_of_clock_and_settings() {
+    let format = fs::read_to_string(repository().join("docs/scene-format.md")).expect("readable");
+    let clock = documented_defaults(&format, "Clock");
+    let render = documented_defaults(&format, "Render");
+    assert!(clock.contains("shutter") && render.contains("exr_bits"), "{clock}; {render}");
+    let scene = scene_with(&format!("clock: ({clock}), render: ({render}),"));
+    assert_eq!(scene.clock, Clock::default(), "{clock}");
+    assert_eq!(scene.render, RenderSettings::default(), "{render}");
+}
+
+#[test]
+fn the_scene_that_the_format_shows_loads() {
+    let format = fs::read_to_string(repository().join("docs/scene-format.md")).expect("readable");
+    let text = format.split("```ron\n").nth(1).and_then(|rest| rest.split("```").next());
+    let text = text.expect("it begins with a scene");
+    let scene = parse_scene_str("format.ron", text, None, &LoadOptions::default());
+    let scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+    assert!(scene.warnings.0.is_empty(), "{}", scene.warnings.render(false));
 }

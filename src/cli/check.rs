@@ -135,7 +135,7 @@ fn textures(scene: &SceneDescription) -> String {
     };
     let bytes: u64 = scene.textures.values().map(memory).sum();
     match scene.textures.len() {
-        0 => "0".to_owned(),
+        count if bytes == 0 => count.to_string(),
         count => format!("{count}, {} of decoded images", format::bytes(bytes)),
     }
 }
