@@ -217,8 +217,8 @@ impl Simulation {
         self.world.resource_mut::<StageClock>().0.clear();
         self.schedule.run(&mut self.world);
         self.world.clear_trackers();
-        if let Some(first) = self.world.resource::<Surfaces>().dangling.first() {
-            return Err(RenderError::Dangling(first.clone()));
+        if let Some(first) = self.dangling() {
+            return Err(RenderError::Dangling(first));
         }
         let mut status = self.world.resource_mut::<IntegrateStatus>();
         let status = std::mem::take(&mut *status);
@@ -239,6 +239,14 @@ impl Simulation {
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
         Ok(RenderedFrame { film, report, world_to_camera })
+    }
+
+    /// The first reference of a component to an entity which is not what it should be.
+    fn dangling(&self) -> Option<String> {
+        let surfaces = self.world.resource::<Surfaces>().dangling.first();
+        let instances = || self.world.resource::<Instances>().dangling.first();
+        let camera = || self.world.resource::<ViewCamera>().dangling.as_ref();
+        surfaces.or_else(instances).or_else(camera).cloned()
     }
 
     fn check_clock(&self) -> Result<(), RenderError> {

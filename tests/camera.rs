@@ -57,15 +57,29 @@ fn moments(picture: &Picture) -> (f64, DVec2, f64) {
 }
 
 /// Oracle: at vertical field of view 60° the point (1, 0.5, −5) lies at 320 + 240·√3·(x/5) and
-/// 240 − 240·√3·(y/5) pixels of 640 × 480: here a tenth of that size.
+/// 240 − 240·√3·(y/5) pixels of 640 × 480: here at a tenth of that size, the middle of a square whose
+/// coverage of each pixel is the product of two overlaps.
 #[test]
 fn points_land_where_the_projection_says() {
     let lamp = r#""lamp": (transform: (translation: (1, 0.5, -5)), shape: Rectangle(size: (0.4, 0.4)), emission: Radiance((1, 1, 1)))"#;
     let picture = render(&before_camera("fov: 60", "Box()", lamp), (64, 48), 256);
-    let (_, mean, _) = moments(&picture);
     let scale = 24.0 * 3.0_f64.sqrt();
-    let expected = DVec2::new(32.0 + scale * 0.2, 24.0 - scale * 0.1);
-    assert!((mean - expected).length() < 0.02, "{mean} instead of {expected}");
+    let middle = DVec2::new(32.0 + scale * 0.2, 24.0 - scale * 0.1);
+    assert!(
+        (middle * 10.0 - DVec2::new(403.138_44, 198.430_78)).length() < 1e-4,
+        "the oracle itself"
+    );
+    let overlap = |pixel: u32, middle: f64| {
+        let (low, high) = (middle - scale * 0.04, middle + scale * 0.04);
+        (high.min(f64::from(pixel) + 1.0) - low.max(f64::from(pixel))).max(0.0)
+    };
+    for y in 0..48 {
+        for x in 0..64 {
+            let expected = overlap(x, middle.x) * overlap(y, middle.y);
+            let value = f64::from(picture.at(x, y).y);
+            assert!((value - expected).abs() < 0.02, "({x}, {y}): {value} instead of {expected}");
+        }
+    }
 }
 
 /// Oracle: a sphere of radius r at distance d on the axis has the silhouette radius
@@ -81,12 +95,12 @@ fn a_sphere_covers_the_area_of_its_silhouette() {
     assert!((area / expected - 1.0).abs() < 2e-3, "{area} instead of {expected}");
 }
 
-/// The picture of a lamp out of focus: its true size is far below a pixel. Aperture radius 0.05, in
+/// The picture of a lamp out of focus: its image in focus is a square of 1.2 pixels. Aperture radius 0.05, in
 /// focus at 4, the field chosen so that a pixel of the plane in focus is 0.01 m.
 fn blur(z: f64, camera: &str, samples: u32) -> Picture {
     // blur on the plane in focus has the diameter A·|z − f|/z, A = 0.1
     let fov = (2.0 * (0.12_f64 / 4.0).atan()).to_degrees();
-    let size = 0.004 * z / 4.0;
+    let size = 0.012 * z / 4.0;
     let lamp = format!(
         r#""lamp": (transform: (translation: (0, 0, {})), shape: Rectangle(size: ({size}, {size})), emission: Radiance((1, 1, 1)))"#,
         -z
@@ -100,13 +114,12 @@ fn blur(z: f64, camera: &str, samples: u32) -> Picture {
 #[test]
 fn a_point_out_of_focus_becomes_an_even_disk() {
     for (z, diameter) in [(8.0, 0.05), (2.0, 0.1), (2.666_666_7, 0.05)] {
-        // Few samples find so small a lamp: the pixel only sees it through a share of the lens.
         let picture = blur(z, "focus: Some(4)", 8192);
         let (_, mean, spread) = moments(&picture);
         assert!((mean - 12.0).length() < 0.15, "z = {z}: centre {mean}");
         let radius = 0.5 * diameter / 0.01;
         // Pixels and the lamp itself add their own second moments, a²/6 each.
-        let expected = 0.5 * radius * radius + 1.0 / 6.0 + 0.16 / 6.0;
+        let expected = 0.5 * radius * radius + 1.0 / 6.0 + 1.44 / 6.0;
         assert!((spread / expected - 1.0).abs() < 0.05, "z = {z}: {spread} instead of {expected}");
     }
 }
@@ -119,7 +132,7 @@ fn blades_shape_the_blur() {
         let camera = format!("focus: Some(4), blades: {blades}, blade_rotation: 20");
         let (_, _, spread) = moments(&blur(2.0, &camera, 8192));
         let angle = std::f64::consts::TAU / f64::from(blades);
-        let expected = 25.0 / 6.0 * (2.0 + angle.cos()) + 1.0 / 6.0 + 0.16 / 6.0;
+        let expected = 25.0 / 6.0 * (2.0 + angle.cos()) + 1.0 / 6.0 + 1.44 / 6.0;
         assert!(
             (spread / expected - 1.0).abs() < 0.05,
             "{blades} blades: {spread} instead of {expected}"

@@ -34,6 +34,8 @@ pub struct ViewCamera {
     blade_rotation: f64,
     /// What the user should know about this camera.
     pub warning: Option<String>,
+    /// That the camera is focused on an entity which stands nowhere, in words.
+    pub dangling: Option<String>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -56,6 +58,7 @@ impl Default for ViewCamera {
             blades: 0,
             blade_rotation: 0.0,
             warning: None,
+            dangling: None,
         }
     }
 }
@@ -200,6 +203,12 @@ pub fn extract_camera(
         (None, None, Some(aim)) => vec![(aim.target - here).length()],
         (None, None, None) => vec![f64::INFINITY],
     };
+    let dangling = match camera.focus {
+        Some(Focus::Entity(target)) if !targets.contains(target) => {
+            Some(format!("the camera is focused on {target}, which stands nowhere"))
+        }
+        _ => None,
+    };
     let lens_radius: Vec<f64> = fov_deg.iter().map(|&fov| camera.lens_radius(fov)).collect();
     if lens_radius.iter().any(|&r| r > 0.0) && focus.iter().any(|&f| f <= 0.0) {
         warning = Some("the camera is focused on something behind it: nothing is sharp".to_owned());
@@ -221,6 +230,7 @@ pub fn extract_camera(
         blades: camera.blades,
         blade_rotation: camera.blade_rotation,
         warning,
+        dangling,
     });
 }
 

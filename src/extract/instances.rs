@@ -78,6 +78,8 @@ pub struct Instances {
     slots: EntityHashMap<u32>,
     /// How many were written in this frame.
     pub rewritten: usize,
+    /// What refers to an entity which is not what it should be, in words.
+    pub dangling: Vec<String>,
 }
 
 type ObjectQuery<'w, 's> = Query<
@@ -151,12 +153,23 @@ pub fn extract_instances(
             by_name.into_iter().zip(1..).map(|((_, entity), id)| (entity, id)).collect();
         table.list.clear();
         table.slots.clear();
+        table.dangling.clear();
         for entity in entities {
             let Ok((_, shape, motion, _, made_of, own_material, emits, hidden)) =
                 objects.get(entity)
             else {
                 continue;
             };
+            if let Shape::Mesh(mesh) = shape
+                && !meshes.slots.contains_key(mesh)
+            {
+                table.dangling.push(format!("the shape of {entity} refers to {mesh} as a mesh"));
+            }
+            if let Some(MadeOf(shared)) = made_of
+                && !slots.materials.contains_key(shared)
+            {
+                table.dangling.push(format!("{entity} is made of {shared}, which has no material"));
+            }
             let Some(instance) =
                 instance(shape, motion, origin.0, &meshes).map(|(geometry, motion, bounds)| {
                     let material = match made_of {
