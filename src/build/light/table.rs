@@ -2,7 +2,7 @@
 //! power.
 
 use super::SkyLight;
-use crate::build::bvh::{MeshTrees, TopLevel};
+use crate::build::bvh::MeshTrees;
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
@@ -84,7 +84,6 @@ pub fn rebuild_light_table(
     surfaces: Res<Surfaces>,
     punctual: Res<PunctualLights>,
     meshes: Res<MeshTrees>,
-    top: Res<TopLevel>,
     mut table: ResMut<LightTable>,
 ) {
     let emitters_may_have_moved = instances.is_changed();
@@ -94,23 +93,23 @@ pub fn rebuild_light_table(
         }
         return;
     }
-    let mut builder = Builder { table: LightTable::default(), weights: Vec::new() };
+    let mut builder =
+        Builder { table: LightTable::default(), weights: Vec::new(), distant: Vec::new() };
     for (index, instance) in (0..).zip(&instances.list) {
         builder.add_instance(index, instance, &surfaces, &meshes);
     }
-    let bounds = top.bounds();
-    // Light from infinitely far away is compared with lamps by what it sends through the scene's
-    // bounding sphere; without bounded objects any radius does.
-    let radius = if bounds.is_empty() { 1.0 } else { (bounds.max - bounds.min).length() * 0.5 };
     for (index, light) in (0..).zip(&punctual.0) {
-        builder.add_punctual(index, light, &surfaces.materials, f64::from(radius));
+        builder.add_punctual(index, light, &surfaces.materials);
     }
     *table = builder.finish();
 }
 
 struct Builder {
     table: LightTable,
+    /// Flux of each emitter; of distant ones what they send through one square metre.
     weights: Vec<f64>,
+    /// Emitters infinitely far away.
+    distant: Vec<u32>,
 }
 
 impl Builder {
@@ -178,15 +177,9 @@ impl Builder {
         self.table.first_of_instance.push(first);
     }
 
-    fn add_punctual(
-        &mut self,
-        index: u32,
-        light: &PunctualLight,
-        materials: &MaterialTable,
-        scene_radius: f64,
-    ) {
-        let disk = PI * scene_radius * scene_radius;
+    fn add_punctual(&mut self, index: u32, light: &PunctualLight, materials: &MaterialTable) {
         let mut sky = None;
+        let mut is_distant = false;
         let weight = match light.light {
             Light::Point { intensity, power } => {
                 f64::from(luminance(PunctualLight::point_intensity(intensity, power))) * 4.0 * PI
@@ -194,20 +187,40 @@ impl Builder {
             Light::Spot { intensity, angle, .. } => {
                 f64::from(luminance(intensity)) * TAU * (1.0 - f64::from(angle).to_radians().cos())
             }
-            Light::Directional { irradiance, .. } => f64::from(luminance(irradiance)) * disk,
+            Light::Directional { irradiance, .. } => {
+                is_distant = true;
+                f64::from(luminance(irradiance))
+            }
             Light::Sky { radiance, scale } => {
                 let light = SkyLight::new(radiance, scale, materials);
-                let flux = light.mean_radiance() * 4.0 * PI * disk;
-                sky = Some(light);
-                flux
+                let per_area = light.mean_radiance() * 4.0 * PI;
+                (sky, is_distant) = (Some(light), true);
+                per_area
             }
         };
         let emitter = self.add(Emitter::Punctual(index), weight);
+        if is_distant {
+            self.distant.push(emitter);
+        }
         self.table.of_punctual.push(emitter);
         self.table.skies.push(sky);
     }
 
-    fn finish(self) -> LightTable {
+    /// What is infinitely far away has no flux that could be compared with that of lamps: how much of it
+    /// enters the scene grows with the scene, and one huge object would starve all lamps. Both kinds
+    /// share the choices evenly, and within each kind the choice follows the power.
+    fn finish(mut self) -> LightTable {
+        let (mut near, mut far) = (0.0, 0.0);
+        for (k, weight) in (0..).zip(&self.weights) {
+            let sum = if self.distant.contains(&k) { &mut far } else { &mut near };
+            *sum += weight;
+        }
+        let balance: f64 = near / far;
+        if balance.is_normal() && balance > 0.0 {
+            for &k in &self.distant {
+                self.weights[k as usize] *= balance;
+            }
+        }
         let choice = (!self.weights.is_empty()).then(|| Piecewise1D::new(self.weights));
         LightTable { choice, built: true, ..self.table }
     }
