@@ -177,12 +177,12 @@ impl Simulation {
     /// # Errors
     /// When there is no camera, a reference dangles or the clock cannot run.
     pub fn prepare_frame(&mut self, frame: u32) -> Result<(), RenderError> {
-        let samples = std::mem::take(&mut self.world.resource_mut::<Settings>().0.samples);
-        let size = std::mem::replace(&mut self.world.resource_mut::<Settings>().0.size, (1, 1));
-        let outcome = self.run(frame, &RenderControl::default());
-        let mut settings = self.world.resource_mut::<Settings>();
-        (settings.0.samples, settings.0.size) = (samples, size);
-        outcome.map(|_| ())
+        let control = RenderControl::default();
+        control.cancel.store(true, Relaxed);
+        match self.run(frame, &control) {
+            Err(RenderError::Cancelled) | Ok(_) => Ok(()),
+            Err(error) => Err(error),
+        }
     }
 
     /// Renders a frame.
@@ -235,7 +235,7 @@ impl Simulation {
             non_finite: film.non_finite(),
             truncated_paths: status.counters.truncated,
             integrator: self.integrator(),
-            warnings: self.warnings(&film),
+            warnings: self.warnings(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
         Ok(RenderedFrame { film, report, world_to_camera })
@@ -291,26 +291,22 @@ impl Simulation {
         rebuilt
     }
 
-    fn integrator(&self) -> String {
+    /// The integrator which the settings ask for, and for `Auto` why it is taken.
+    pub fn integrator(&self) -> String {
         match self.world.resource::<Settings>().0.integrator {
             IntegratorChoice::Path => "Path".to_owned(),
-            IntegratorChoice::Auto => "Path (Auto: the only integrator so far)".to_owned(),
+            IntegratorChoice::Auto => "Path (Auto takes it: the only integrator so far)".to_owned(),
         }
     }
 
-    fn warnings(&self, film: &Film) -> Vec<String> {
+    /// What the user should know of the frame that was prepared or rendered last.
+    pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.world.resource::<Requirements>().warnings.clone();
         warnings.extend(self.world.resource::<ViewCamera>().warning.clone());
         if self.world.resource::<LightTable>().is_empty() {
             warnings.push(
                 "the scene has no light: give an entity an `emission` or a `light`".to_owned(),
             );
-        }
-        if film.non_finite() > 0 {
-            warnings.push(format!(
-                "{} samples were not finite numbers and were left out",
-                film.non_finite()
-            ));
         }
         warnings
     }
@@ -334,4 +330,27 @@ fn frame_schedule(world: &mut World) -> Schedule {
     build::install(world, &mut frame);
     integrate::install(world, &mut frame);
     frame
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every two systems which touch the same data are ordered.
+    #[test]
+    fn the_schedule_has_no_ambiguities() {
+        let mut simulation = Simulation::new();
+        simulation.schedule.initialize(&mut simulation.world).expect("no ambiguities");
+    }
+
+    /// The test above can fail: an unordered writer of the same resource is an error.
+    #[test]
+    fn an_unordered_conflict_is_found() {
+        fn meddle(mut settings: ResMut<Settings>) {
+            settings.0.samples += 1;
+        }
+        let mut simulation = Simulation::new();
+        simulation.schedule.add_systems(meddle);
+        assert!(simulation.schedule.initialize(&mut simulation.world).is_err());
+    }
 }

@@ -4,22 +4,48 @@ use super::arguments::CheckArguments;
 use super::engine;
 use super::failure::Failure;
 use super::format;
+use super::survey::{Survey, scene_warnings};
 use kinora::description::{
     EntityDescription, ImagePixels, Light, SceneDescription, Shape, Texture,
 };
 use std::collections::HashSet;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
 
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let scene = engine::load(&arguments.scene)?;
+    let survey = Survey::new(&scene)?;
     let mut out = io::stdout().lock();
     writeln!(out, "{} is a valid scene\n", arguments.scene.path.display())?;
-    for (label, text) in contents(&scene).into_iter().chain(cost(&scene)) {
+    let lines = contents(&scene).into_iter().chain(requirements(&survey)).chain(cost(&scene));
+    for (label, text) in lines {
         writeln!(out, "  {label:<10} {text}")?;
+    }
+    for warning in scene_warnings(&scene, io::stdout().is_terminal()) {
+        writeln!(out, "\n{warning}")?;
+    }
+    for warning in &survey.warnings {
+        writeln!(out, "\nwarning: {warning}")?;
     }
     out.flush()?;
     Ok(())
+}
+
+/// What the renderer has to do for this scene, each with its reason, and which integrator does it.
+fn requirements(survey: &Survey) -> Vec<(&'static str, String)> {
+    let frames: Vec<String> = survey.frames.iter().map(u32::to_string).collect();
+    let seen = match frames.as_slice() {
+        [frame] => format!("(seen at frame {frame})"),
+        [rest @ .., last] => format!("(seen at frames {} and {last})", rest.join(", ")),
+        [] => String::new(),
+    };
+    let mut lines = match survey.features.len() {
+        0 => vec![("requires", format!("nothing beyond still and opaque surfaces {seen}"))],
+        count => vec![("requires", format!("{} {seen}", format::plural(count, "feature")))],
+    };
+    lines.extend(survey.features.iter().map(|(name, why)| ("", format!("  {name}: {why}"))));
+    lines.push(("integrator", survey.integrator.clone()));
+    lines
 }
 
 /// What there is, line by line.
@@ -39,9 +65,8 @@ fn contents(scene: &SceneDescription) -> Vec<(&'static str, String)> {
         (
             "picture",
             format!(
-                "{width} × {height} pixels, {}, integrator {:?}",
-                format::plural(scene.render.samples as usize, "sample") + " per pixel",
-                scene.render.integrator
+                "{width} × {height} pixels, {} per pixel",
+                format::plural(scene.render.samples as usize, "sample"),
             ),
         ),
         ("camera", camera(scene)),
@@ -92,8 +117,8 @@ fn meshes(scene: &SceneDescription) -> String {
     match scene.meshes.len() {
         0 => "0".to_owned(),
         count => format!(
-            "{count} of {} triangles in all; {} with every instance",
-            format::count(triangles as f64),
+            "{count} with {}; {} over all instances",
+            format::plural(triangles, "triangle"),
             format::count(placed as f64)
         ),
     }
@@ -110,7 +135,7 @@ fn textures(scene: &SceneDescription) -> String {
     };
     let bytes: u64 = scene.textures.values().map(memory).sum();
     match scene.textures.len() {
-        0 => "0".to_owned(),
+        count if bytes == 0 => count.to_string(),
         count => format!("{count}, {} of decoded images", format::bytes(bytes)),
     }
 }
@@ -192,7 +217,7 @@ mod tests {
         let lines = contents(&scene);
         let line = |label| &lines.iter().find(|(name, _)| *name == label).expect("printed").1;
         assert_eq!(line("shapes"), "4: 3 × mesh, 1 × sphere");
-        assert_eq!(line("meshes"), "1 of 7 triangles in all; 21 with every instance");
+        assert_eq!(line("meshes"), "1 with 7 triangles; 21 over all instances");
         assert_eq!(line("textures"), "2, 96 B of decoded images", "shared images count once");
         assert_eq!(line("lights"), "1: 1 × point");
         assert_eq!(line("camera"), "`eye`");

@@ -10,6 +10,7 @@ mod interrupt;
 mod progress;
 mod render;
 mod summary;
+mod survey;
 
 use arguments::{Arguments, Command};
 use clap::Parser;

@@ -112,9 +112,11 @@ impl Progress {
         if !self.told.insert(text.to_owned()) {
             return;
         }
+        // Excerpts of a scene are labelled already.
+        let label = if text.starts_with("warning") { "" } else { "warning: " };
         match &self.view {
-            View::Bars(bars) => bars.print(&format!("warning: {text}")),
-            View::Lines => say(&format!("warning: {text}")),
+            View::Bars(bars) => bars.print(&format!("{label}{text}")),
+            View::Lines => say(&format!("{label}{text}")),
             View::Json => event("warning", json!({ "text": text })),
             View::None => {}
         }

@@ -8,6 +8,7 @@ use super::frames::FrameList;
 use super::interrupt::cancel_on_signal;
 use super::progress::Progress;
 use super::summary::Summary;
+use super::survey::scene_warnings;
 use kinora::description::SceneDescription;
 use kinora::frame::{RenderControl, RenderedFrame};
 use kinora::output::{
@@ -49,7 +50,13 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let mut summary = Summary::new(job.kept());
     let mut progress = Progress::new(arguments.progress, &job.control, job.pending.len());
     progress.start(&job.opening(), job.opening_facts());
+    for warning in scene_warnings(&job.scene, false) {
+        progress.warn(&warning);
+    }
     let outcome = job.render_pending(&mut manifest, &mut progress, &mut summary);
+    for warning in summary.warnings() {
+        progress.warn(&warning);
+    }
     match &outcome {
         Ok(()) => progress
             .end(&summary.for_people(&job.folder), summary.for_programs("done", &job.folder)),
@@ -83,7 +90,7 @@ impl Job {
                 |error| Failure::Usage(format!("the scene's clock: {error}; use --frames")),
             )?,
         };
-        let fingerprint = JobFingerprint::new(&scene, &arguments.scene.overrides);
+        let fingerprint = JobFingerprint::new(&scene);
         let is_pending = |&frame: &u32| {
             arguments.fresh
                 || !frame_is_complete(&folder, &name, frame, fingerprint.of_frame(frame))
@@ -158,8 +165,8 @@ impl Job {
             let entry = self.write(frame, rendered, start)?;
             manifest.record(&entry)?;
             summary.add(&entry);
-            for warning in warnings(&entry) {
-                progress.warn(&warning);
+            for warning in &entry.report.warnings {
+                progress.warn(warning);
             }
             progress.frame_done(&entry);
         }
@@ -197,24 +204,4 @@ impl Job {
             report,
         })
     }
-}
-
-/// What the user should know of a frame.
-fn warnings(entry: &FrameEntry) -> Vec<String> {
-    let mut warnings = entry.report.warnings.clone();
-    let frame = entry.frame;
-    if entry.report.non_finite > 0 {
-        warnings.push(format!(
-            "frame {frame}: {} samples were not finite and were dropped",
-            entry.report.non_finite
-        ));
-    }
-    if entry.saturated > 0 {
-        warnings.push(format!(
-            "frame {frame}: {} numbers are too large for 16 bits and were written as 65504; \
-             exr_bits: 32 keeps them",
-            entry.saturated
-        ));
-    }
-    warnings
 }

@@ -13,6 +13,9 @@ pub struct Summary {
     stages: Vec<(&'static str, f64)>,
     samples: u64,
     rays: u64,
+    /// Samples which were not finite, and numbers too large for 16 bits.
+    non_finite: u64,
+    saturated: u64,
     /// Frames rendered by this run, and frames found finished.
     pub rendered: usize,
     pub kept: usize,
@@ -20,13 +23,24 @@ pub struct Summary {
 
 impl Summary {
     pub fn new(kept: usize) -> Self {
-        Self { start: Instant::now(), stages: Vec::new(), samples: 0, rays: 0, rendered: 0, kept }
+        Self {
+            start: Instant::now(),
+            stages: Vec::new(),
+            samples: 0,
+            rays: 0,
+            non_finite: 0,
+            saturated: 0,
+            rendered: 0,
+            kept,
+        }
     }
 
     pub fn add(&mut self, entry: &FrameEntry) {
         self.rendered += 1;
         self.samples += entry.report.samples;
         self.rays += entry.report.rays;
+        self.non_finite += entry.report.non_finite;
+        self.saturated += entry.saturated;
         let in_stages: f64 = entry.report.stage_seconds.iter().map(|(_, seconds)| seconds).sum();
         let files = ("develop and write", (entry.wall_seconds - in_stages).max(0.0));
         for &(stage, seconds) in entry.report.stage_seconds.iter().chain([&files]) {
@@ -35,6 +49,26 @@ impl Summary {
                 None => self.stages.push((stage, seconds)),
             }
         }
+    }
+
+    /// What went wrong in some frames, told once for all of them; the manifest has it by frame.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.non_finite > 0 {
+            warnings.push(format!(
+                "{} of {} samples were not finite numbers and were left out: {MANIFEST_NAME} tells \
+                 in which frames",
+                self.non_finite, self.samples
+            ));
+        }
+        if self.saturated > 0 {
+            warnings.push(format!(
+                "{} numbers were too large for 16 bits and were written as 65504; \
+                 `--set render.exr_bits=32` keeps them",
+                self.saturated
+            ));
+        }
+        warnings
     }
 
     pub fn for_people(&self, folder: &Path) -> String {

@@ -64,7 +64,7 @@ impl Default for RenderSettings {
         Self {
             size: (640, 480),
             samples: 64,
-            max_depth: 64,
+            max_depth: 1000,
             roulette_depth: 4,
             integrator: IntegratorChoice::Auto,
             seed: 0,

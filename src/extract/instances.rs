@@ -39,6 +39,8 @@ pub struct Instance {
     pub emission: u32,
     /// From 1, in the order of names.
     pub object_id: u32,
+    /// Whether its material or emission looks at uv.
+    pub needs_uv: bool,
     /// Whether camera rays pass through it.
     pub hidden_from_camera: bool,
 }
@@ -174,16 +176,19 @@ pub fn extract_instances(
                         Some(MadeOf(shared)) => Some(*shared),
                         None => own_material.then_some(entity),
                     };
+                    let material = match material.and_then(|m| slots.materials.get(&m)) {
+                        Some(slot) => *slot,
+                        None if emits => NOTHING,
+                        None => surfaces.default_material,
+                    };
+                    let emission = if emits { slots.emissions[&entity] } else { NOTHING };
                     Instance {
                         geometry,
                         motion,
                         bounds,
-                        material: match material.and_then(|m| slots.materials.get(&m)) {
-                            Some(slot) => *slot,
-                            None if emits => NOTHING,
-                            None => surfaces.default_material,
-                        },
-                        emission: if emits { slots.emissions[&entity] } else { NOTHING },
+                        material,
+                        emission,
+                        needs_uv: surfaces.needs_uv(material, emission),
                         object_id: ids[&entity],
                         hidden_from_camera: hidden,
                     }

@@ -16,6 +16,8 @@ pub struct Surfaces {
     pub emissions: Vec<SurfaceEmission>,
     /// Index of the grey of objects which have no material and emit nothing.
     pub default_material: u32,
+    /// Materials which look at uv, by index.
+    textured: Vec<bool>,
     /// What refers to an entity which is not what it should be, in words.
     pub dangling: Vec<String>,
 }
@@ -35,8 +37,18 @@ impl Surfaces {
         let default_material = materials.len() as u32;
         let grey = Value::Constant(Rgb::splat(0.5));
         materials.push(crate::description::Material::Diffuse { albedo: grey });
+        let textured = materials.iter().map(is_textured).collect();
         let materials = MaterialTable::new(&materials, textures);
-        Self { materials, emissions, default_material, dangling: Vec::new() }
+        Self { materials, emissions, default_material, textured, dangling: Vec::new() }
+    }
+
+    /// Whether a material or an emission, each by index or [`super::NOTHING`], looks at uv.
+    pub fn needs_uv(&self, material: u32, emission: u32) -> bool {
+        let emission = self.emissions.get(emission as usize);
+        self.textured.get(material as usize).is_some_and(|textured| *textured)
+            || emission.is_some_and(|e| {
+                matches!(e.strength, EmissionStrength::Radiance(Value::Texture(_)))
+            })
     }
 }
 
@@ -49,6 +61,11 @@ pub struct SurfaceEmission {
     pub factor: f32,
     /// Whether the back emits as well.
     pub two_sided: bool,
+}
+
+/// Whether a material reads a texture, or refers to another material, which may.
+fn is_textured(material: &crate::description::Material<u32>) -> bool {
+    material.clone().map_refs::<(), ()>(&mut |_| Err(()), &mut |_| Err(())).is_err()
 }
 
 /// Which entity became which index in [`Surfaces`].
@@ -65,7 +82,6 @@ pub struct SurfaceSlots {
 /// Rebuilds [`Surfaces`] when a texture, a material or an emission was added, changed or removed.
 ///
 /// Slots follow the order of the entities, which is that of spawning.
-#[expect(clippy::too_many_arguments, reason = "the signature lists what the table depends on")]
 pub fn extract_surfaces(
     changed: Query<
         (),

@@ -12,6 +12,7 @@ use bevy_ecs::prelude::*;
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Mutex, PoisonError};
 
 /// How the integration of a frame ended.
 #[derive(Resource, Debug, Default)]
@@ -46,6 +47,9 @@ pub fn render_film(
 ) {
     let settings = &settings.0;
     *status = IntegrateStatus::default();
+    if control.cancel.load(Relaxed) {
+        return;
+    }
     let mut film = match Film::new(settings.size, &settings.layers) {
         Ok(film) => film,
         Err(error) => {
@@ -63,11 +67,12 @@ pub fn render_film(
         has_lens: requires(Feature::Lens),
         control: &control,
     };
+    let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
     let counters = match (requires(Feature::Opacity), requires(Feature::Absorption)) {
-        (false, false) => fill(&mut film, &tracer::<false, false>(scene, settings, &origin), &job),
-        (false, true) => fill(&mut film, &tracer::<false, true>(scene, settings, &origin), &job),
-        (true, false) => fill(&mut film, &tracer::<true, false>(scene, settings, &origin), &job),
-        (true, true) => fill(&mut film, &tracer::<true, true>(scene, settings, &origin), &job),
+        (false, false) => fill(&mut film, &begin.tracer::<false, false>(), &job),
+        (false, true) => fill(&mut film, &begin.tracer::<false, true>(), &job),
+        (true, false) => fill(&mut film, &begin.tracer::<true, false>(), &job),
+        (true, true) => fill(&mut film, &begin.tracer::<true, true>(), &job),
     };
     if let Some(counters) = counters {
         status.film = Some(film);
@@ -75,39 +80,49 @@ pub fn render_film(
     }
 }
 
-fn tracer<'a, const OPACITY: bool, const ABSORPTION: bool>(
+/// What an integrator begins with, whatever its generic parameters.
+struct Begin<'a> {
     scene: SceneView<'a>,
-    settings: &RenderSettings,
-    origin: &FrameOrigin,
-) -> PathTracer<'a, OPACITY, ABSORPTION> {
-    PathTracer {
-        scene,
-        max_depth: settings.max_depth,
-        roulette_depth: settings.roulette_depth,
-        clamp_indirect: settings.clamp_indirect,
-        wants_first_hit: Film::new((1, 1), &settings.layers).is_ok_and(|f| f.wants_first_hit()),
-        origin: origin.0,
+    settings: &'a RenderSettings,
+    origin: &'a FrameOrigin,
+    first_hit: bool,
+}
+
+impl<'a> Begin<'a> {
+    fn tracer<const OPACITY: bool, const ABSORPTION: bool>(
+        &self,
+    ) -> PathTracer<'a, OPACITY, ABSORPTION> {
+        PathTracer {
+            scene: self.scene,
+            max_depth: self.settings.max_depth,
+            roulette_depth: self.settings.roulette_depth,
+            clamp_indirect: self.settings.clamp_indirect,
+            wants_first_hit: self.first_hit,
+            origin: self.origin.0,
+        }
     }
 }
 
 /// Renders all tiles; `None` when the control cancelled it.
+///
+/// Tiles share no pixel, so that the order in which they are merged does not show.
 fn fill<const OPACITY: bool, const ABSORPTION: bool>(
     film: &mut Film,
     tracer: &PathTracer<OPACITY, ABSORPTION>,
     job: &Job,
 ) -> Option<PathCounters> {
     let tiles = film.tiles();
-    let empty = &*film;
-    let finished: Vec<(TileBuffer, PathCounters)> = tiles
+    let film = Mutex::new(film);
+    let lock = || film.lock().unwrap_or_else(PoisonError::into_inner);
+    tiles
         .into_par_iter()
-        .map(|tile| render_tile(empty.tile_buffer(tile), tile, tracer, job))
-        .collect::<Option<_>>()?;
-    let mut counters = PathCounters::default();
-    for (buffer, tile_counters) in finished {
-        film.merge(buffer);
-        counters = counters.plus(tile_counters);
-    }
-    Some(counters)
+        .map(|tile| {
+            let buffer = lock().tile_buffer(tile);
+            let (buffer, counters) = render_tile(buffer, tile, tracer, job)?;
+            lock().merge(buffer);
+            Some(counters)
+        })
+        .try_reduce(PathCounters::default, |a, b| Some(a.plus(b)))
 }
 
 fn render_tile<const OPACITY: bool, const ABSORPTION: bool>(

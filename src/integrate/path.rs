@@ -82,7 +82,7 @@ struct Vertex<'a> {
     bsdf: Bsdf<'a>,
 }
 
-impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, ABSORPTION> {
+impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORPTION> {
     /// The radiance which arrives along a camera ray.
     pub fn sample(
         &self,
@@ -116,17 +116,22 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             let instance = &self.scene.geometry.instances[hit.instance as usize];
             let materials = &self.scene.surfaces.materials;
             let wo = -ray.d;
+            if ABSORPTION {
+                throughput *= self.transmittance(inside, hit.t);
+            }
+            // One number decides whether the ray passes through a hole and, stretched back to the
+            // whole interval, whether the path goes on.
+            let mut roulette = None;
             if OPACITY && instance.material != NOTHING {
                 let opacity = materials.opacity(instance.material, surface.uv);
-                let passes =
-                    opacity < 1.0 && sampler.one(dimensions + dimension::ROULETTE) >= opacity;
-                if passes {
-                    ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
-                    continue;
+                if opacity < 1.0 {
+                    let u = sampler.one(dimensions + dimension::ROULETTE);
+                    if u >= opacity {
+                        ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                        continue;
+                    }
+                    roulette = Some(u / opacity);
                 }
-            }
-            if ABSORPTION && inside != NOTHING {
-                throughput *= self.transmittance(inside, hit.t);
             }
             let emitted = self.emitted(&hit, &surface, wo, ray.time, arrival);
             radiance += self.limited(throughput * emitted, depth);
@@ -145,7 +150,14 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             let vertex = Vertex::new(surface, wo, bsdf);
             let receiver = vertex.receiver();
             if bsdf.has_non_delta() {
-                let light = self.direct(&vertex, &receiver, sampler, dimensions, &ray, counters);
+                let (wi, distance, light) =
+                    self.direct(&vertex, &receiver, sampler, dimensions, ray.time, counters);
+                let light = if ABSORPTION && light != Rgb::ZERO {
+                    let medium = self.medium_towards(wi, &vertex, instance.material, inside);
+                    light * self.transmittance(medium, distance)
+                } else {
+                    light
+                };
                 radiance += self.limited(throughput * light, depth);
             }
             let Some((wi, sample)) =
@@ -155,18 +167,14 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             };
             throughput *= sample.weight;
             depth += 1;
-            if sample.transmitted {
-                eta_scale *= sample.eta * sample.eta;
-                if ABSORPTION && materials.is_dielectric(instance.material) {
-                    let entering = wi.dot(vertex.surface.ng) < 0.0;
-                    inside = if entering { instance.material } else { NOTHING };
-                }
+            eta_scale *= sample.eta * sample.eta;
+            if ABSORPTION {
+                inside = self.medium_towards(wi, &vertex, instance.material, inside);
             }
             if depth >= self.roulette_depth {
                 let survival = (throughput * eta_scale).max_element().min(1.0);
-                let u = sampler.one(dimensions + dimension::ROULETTE);
-                // The negation also ends a path whose throughput is NaN.
-                if !(u < survival) {
+                let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
+                if u >= survival || survival.is_nan() {
                     break;
                 }
                 throughput /= survival;
@@ -220,33 +228,46 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         }
     }
 
-    /// Light which arrives straight from a light, by one connection.
+    /// Light which arrives straight from a light, by one connection: with its unit direction and its
+    /// distance in metres.
     fn direct(
         &self,
         vertex: &Vertex,
         receiver: &Receiver,
         sampler: &Sampler,
         dimensions: u32,
-        ray: &Ray,
+        time: f32,
         counters: &mut PathCounters,
-    ) -> Rgb {
+    ) -> (Vec3, f64, Rgb) {
+        const NONE: (Vec3, f64, Rgb) = (Vec3::ZERO, 0.0, Rgb::ZERO);
         let choose = sampler.one(dimensions + dimension::LIGHT);
         let on_light = sampler.two(dimensions + dimension::LIGHT_POINT);
-        let Some(light) = self.scene.lights.sample(receiver, ray.time, choose, on_light) else {
-            return Rgb::ZERO;
+        let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
+            return NONE;
         };
-        let value = vertex.evaluate(light.wi);
-        if value.0 == Rgb::ZERO {
-            return Rgb::ZERO;
+        let (f_cos, pdf) = vertex.evaluate(light.wi);
+        if f_cos == Rgb::ZERO {
+            return NONE;
         }
-        let (shadow_ray, end) = light.shadow_ray(receiver, ray.time);
+        let (shadow_ray, end) = light.shadow_ray(receiver, time);
         counters.rays += 1;
         let visible = self.visible(&shadow_ray, end);
         if visible == 0.0 {
-            return Rgb::ZERO;
+            return NONE;
         }
-        let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, value.1) };
-        value.0 * light.radiance * (visible * weight / light.pdf)
+        let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
+        let distance = end * shadow_ray.d.as_dvec3().length();
+        (light.wi, distance, f_cos * light.radiance * (visible * weight / light.pdf))
+    }
+
+    /// The material of the solid in which a path goes on from a vertex in the direction `wi`, when it
+    /// arrived inside `inside`; [`NOTHING`] outside.
+    fn medium_towards(&self, wi: Vec3, vertex: &Vertex, material: u32, inside: u32) -> u32 {
+        if !vertex.crosses(wi) || !self.scene.surfaces.materials.is_dielectric(material) {
+            return inside;
+        }
+        let entering = wi.dot(vertex.surface.ng) < 0.0;
+        if entering { material } else { NOTHING }
     }
 
     /// Share of the light which passes along a segment.
@@ -279,10 +300,15 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         passed
     }
 
-    /// Beer and Lambert's law inside a solid of this material over a distance in metres.
+    /// Beer and Lambert's law inside a solid of this material over a distance in metres; 1 outside.
     fn transmittance(&self, material: u32, distance: f64) -> Rgb {
+        if material == NOTHING {
+            return Rgb::ONE;
+        }
         match self.scene.surfaces.materials.attenuation(material) {
-            Some(sigma_a) => (sigma_a * -(distance as f32)).map(f32::exp),
+            // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
+            Some(sigma_a) => sigma_a
+                .map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() }),
             None => Rgb::ONE,
         }
     }
@@ -305,9 +331,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     ) -> FirstHit {
         let scene = &self.scene;
         let normal = if surface.ns.dot(ray.d) > 0.0 { -surface.ns } else { surface.ns };
-        let camera_from_render = scene.camera.motion.inverse_at(ray.time);
         let depth = (surface.p - camera_ray.ray.o.as_dvec3()).dot(camera_ray.axis);
-        debug_assert!(camera_from_render.is_finite());
         let albedo = bsdf.map_or(Rgb::ZERO, |bsdf| bsdf.albedo(surface.frame().to_local(-ray.d)));
         let film = |time: f32| scene.camera.project(scene.geometry.point_at(ray, hit, time), time);
         let motion = match (film(0.0), film(1.0)) {
@@ -342,10 +366,14 @@ impl<'a> Vertex<'a> {
 
     /// Whether `wi` leaves by the side on which the BSDF placed it.
     fn is_consistent(&self, wi: Vec3) -> bool {
-        let ng = self.surface.ng;
         let ns = self.surface.ns;
-        let transmits = |n: Vec3| (wi.dot(n) > 0.0) != (self.wo.dot(n) > 0.0);
-        transmits(ng) == transmits(ns)
+        self.crosses(wi) == ((wi.dot(ns) > 0.0) != (self.wo.dot(ns) > 0.0))
+    }
+
+    /// Whether `wi` leaves on the other side of the surface than the path arrived from.
+    fn crosses(&self, wi: Vec3) -> bool {
+        let ng = self.surface.ng;
+        (wi.dot(ng) > 0.0) != (self.wo.dot(ng) > 0.0)
     }
 
     /// `f·|cos θ|` towards a light, and the density with which the BSDF draws that direction.
@@ -366,15 +394,13 @@ impl<'a> Vertex<'a> {
             Some((frame.from_local(sample.wi).normalize(), sample))
         };
         let (wi, sample) = draw(&self.frame)?;
-        let ng = self.surface.ng;
-        let crosses = |wi: Vec3| (wi.dot(ng) > 0.0) != (self.wo.dot(ng) > 0.0);
-        if crosses(wi) == sample.transmitted {
+        if self.crosses(wi) == sample.transmitted {
             return Some((wi, sample));
         }
         if !sample.delta {
             return None;
         }
-        let (wi, sample) = draw(&Frame::from_z_and_tangent(ng, self.surface.dpdu))?;
-        (crosses(wi) == sample.transmitted).then_some((wi, sample))
+        let (wi, sample) = draw(&Frame::from_z(self.surface.ng))?;
+        (self.crosses(wi) == sample.transmitted).then_some((wi, sample))
     }
 }

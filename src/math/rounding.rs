@@ -65,7 +65,7 @@ mod tests {
     /// Oracle: NUMERICS N1, γ(3), γ(5), γ(7) of f32 with u = 2⁻²⁴.
     #[test]
     fn gamma_matches_its_definition() {
-        for (n, expected) in [(3, 1.788_139_7e-7), (5, 2.980_233_2e-7), (7, 4.172_327e-7)] {
+        for (n, expected) in [(3, 1.788_14e-7), (5, 2.980_233e-7), (7, 4.172_327e-7)] {
             assert!((gamma(n) / expected - 1.0).abs() < 1e-6, "γ({n}) = {:e}", gamma(n));
         }
     }

@@ -7,8 +7,11 @@
 
 use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
 use crate::color::CHROMATICITIES;
-use crate::description::{Layer, RenderSettings};
+use crate::description::{Layer, RenderSettings, SceneDescription};
 use crate::film::{Film, Plane, PlaneSamples};
+use crate::frame::RenderedFrame;
+use crate::world::{FrameClock, Settings};
+use bevy_ecs::world::World;
 use exr::error::Error as ExrError;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, LineOrder, Text};
@@ -63,7 +66,7 @@ impl FrameMetadata {
     pub fn new(
         fingerprint: Fingerprint,
         frame: u32,
-        scene: &crate::description::SceneDescription,
+        scene: &SceneDescription,
         integrator: &str,
         world_to_camera: DMat4,
     ) -> Self {
@@ -82,6 +85,16 @@ impl FrameMetadata {
             units: Self::UNITS.to_owned(),
             world_to_camera: world_to_camera.to_cols_array(),
         }
+    }
+
+    /// Gathers the facts of a frame of a world that no scene file describes: the fingerprint, which
+    /// stands for files, is 0, and the camera is nameless.
+    pub fn of_world(world: &World, rendered: &RenderedFrame) -> Self {
+        let clock = world.get_resource::<FrameClock>().copied().unwrap_or_default().clock;
+        let render = world.get_resource::<Settings>().cloned().unwrap_or_default().0;
+        let scene = SceneDescription { clock, render, ..Default::default() };
+        let RenderedFrame { report, world_to_camera, .. } = rendered;
+        Self::new(Fingerprint(0), report.frame, &scene, &report.integrator, *world_to_camera)
     }
 }
 

@@ -23,17 +23,11 @@ pub struct JobFingerprint(String);
 impl JobFingerprint {
     /// Describes a scene as it is going to be rendered, with every setting applied.
     ///
-    /// `overrides` are the `--set` arguments. Those under `render.` and `clock.` are left out, for what
-    /// they do shows in the settings themselves; so `--set render.samples=9` equals `--samples 9`.
     /// The range of frames does not count: frame 7 is the same in every range.
-    pub fn new(scene: &SceneDescription, overrides: &[String]) -> Self {
-        let seen_in_settings = |text: &&String| {
-            !["render.", "clock."].iter().any(|prefix| text.trim_start().starts_with(prefix))
-        };
+    pub fn new(scene: &SceneDescription) -> Self {
         let facts = serde_json::json!({
             "software": SOFTWARE,
             "content": format!("{:032x}", scene.content_hash),
-            "overrides": overrides.iter().filter(seen_in_settings).collect::<Vec<_>>(),
             "render": scene.render,
             "fps": scene.clock.fps,
             "shutter": scene.clock.shutter,
@@ -82,7 +76,7 @@ mod tests {
     fn of(change: impl FnOnce(&mut SceneDescription)) -> Fingerprint {
         let mut scene = SceneDescription { camera: "eye".into(), ..Default::default() };
         change(&mut scene);
-        JobFingerprint::new(&scene, &[]).of_frame(3)
+        JobFingerprint::new(&scene).of_frame(3)
     }
 
     #[test]
@@ -106,17 +100,8 @@ mod tests {
     #[test]
     fn the_range_of_frames_does_not_count_but_the_frame_does() {
         assert_eq!(of(|s| s.clock.frames = (2, 9)), of(|_| ()));
-        let job = JobFingerprint::new(&SceneDescription::default(), &[]);
+        let job = JobFingerprint::new(&SceneDescription::default());
         assert_ne!(job.of_frame(1), job.of_frame(2));
-    }
-
-    #[test]
-    fn overrides_of_the_scene_count_and_those_of_settings_do_not_count_twice() {
-        let scene = SceneDescription::default();
-        let with = |text: &str| JobFingerprint::new(&scene, &[text.to_owned()]);
-        let plain = JobFingerprint::new(&scene, &[]);
-        assert_ne!(with("entities.ball.velocity.linear=(2,0,0)"), plain);
-        assert_eq!(with("render.samples=64"), plain);
     }
 
     #[test]

@@ -168,7 +168,7 @@ mod tests {
     fn a_later_run_keeps_the_entries_that_still_hold() {
         let folder = tempfile::tempdir().expect("temporary folder");
         let mut scene = SceneDescription::default();
-        let job = JobFingerprint::new(&scene, &[]);
+        let job = JobFingerprint::new(&scene);
         let facts = RunFacts::new(&scene, &[], 2);
         let mut first = Manifest::open(folder.path(), facts.clone(), &job);
         first.record(&entry(10, &job)).expect("writable");
@@ -180,7 +180,7 @@ mod tests {
         assert_eq!(frames_of(folder.path()), [2, 3, 10]);
 
         scene.content_hash = 99;
-        let other = JobFingerprint::new(&scene, &[]);
+        let other = JobFingerprint::new(&scene);
         let mut third = Manifest::open(folder.path(), facts, &other);
         third.record(&entry(1, &other)).expect("writable");
         assert_eq!(frames_of(folder.path()), [1]);
@@ -191,7 +191,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("temporary folder");
         std::fs::write(folder.path().join(MANIFEST_NAME), b"{ \"frames\": [ {").expect("writable");
         let scene = SceneDescription::default();
-        let job = JobFingerprint::new(&scene, &[]);
+        let job = JobFingerprint::new(&scene);
         let mut manifest = Manifest::open(folder.path(), RunFacts::new(&scene, &[], 1), &job);
         manifest.record(&entry(0, &job)).expect("writable");
         assert_eq!(frames_of(folder.path()), [0]);

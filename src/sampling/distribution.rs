@@ -32,9 +32,13 @@ impl Piecewise1D {
         let cells = cumulative.len() - 1;
         assert!(cells > 0, "a distribution needs at least one cell");
         if total > 0.0 {
-            cumulative.iter_mut().for_each(|c| *c /= total);
+            for c in &mut cumulative {
+                *c /= total;
+            }
         } else {
-            cumulative.iter_mut().enumerate().for_each(|(k, c)| *c = k as f64 / cells as f64);
+            for (k, c) in cumulative.iter_mut().enumerate() {
+                *c = k as f64 / cells as f64;
+            }
         }
         Self { cumulative, total }
     }

@@ -108,7 +108,7 @@ fn unit(x: u32) -> f32 {
     (x >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// A bijective mixing of 64 bits, the finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+/// A bijective mixing of 64 bits, the finaliser of `SplitMix64` (Steele, Lea and Flood 2014).
 fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -8,7 +8,7 @@ use super::bsdf::{
     AlbedoTable, Bsdf, ConductorFresnel, Diffuse, Mirror, Principled, PrincipledParameters,
     ReflectorLobe, ReflectorTable, RoughConductor, RoughDielectric, RoughPlastic,
     SMOOTH_BELOW_ALPHA, SmoothConductor, SmoothDielectric, SmoothPlastic, ThinGlass, Widths,
-    coat_table, dielectric_average, glass_table, reflector_table,
+    coat_table, dielectric_average, glass_table, reflector_table, reflector_table_at,
 };
 use super::metals;
 use super::texture::{self, RenderTexture};
@@ -27,6 +27,7 @@ pub struct MaterialTable {
     textures: Vec<RenderTexture>,
     coats: Vec<AlbedoTable<1>>,
     glasses: Vec<AlbedoTable<2>>,
+    reflectors: Vec<ReflectorTable>,
 }
 
 /// What is inside a solid dielectric.
@@ -69,6 +70,7 @@ enum Kind {
     Conductor {
         fresnel: MetalColor,
         width: Width,
+        table: Option<u32>,
     },
     Plastic {
         albedo: Value<Rgb, u32>,
@@ -81,6 +83,7 @@ enum Kind {
         base_color: Value<Rgb, u32>,
         metallic: Value<f32, u32>,
         width: Width,
+        table: Option<u32>,
         ior: f32,
         transmission: Value<f32, u32>,
     },
@@ -114,8 +117,8 @@ enum Width {
 }
 
 impl Width {
-    fn new(roughness: &Value<f32, u32>) -> Self {
-        match *roughness {
+    fn new(roughness: Value<f32, u32>) -> Self {
+        match roughness {
             Value::Constant(roughness) => match alpha(roughness) {
                 Some(alpha) => Self::Constant(alpha),
                 None => Self::Smooth,
@@ -179,8 +182,13 @@ impl MaterialTable {
     /// If a reference is out of range or [`material_cycle`] finds a cycle.
     pub fn new(materials: &[Material<u32>], textures: Vec<RenderTexture>) -> Self {
         assert_eq!(material_cycle(materials), None, "the description rejects cycles of materials");
-        let mut table =
-            Self { materials: Vec::new(), textures, coats: Vec::new(), glasses: Vec::new() };
+        let mut table = Self {
+            materials: Vec::new(),
+            textures,
+            coats: Vec::new(),
+            glasses: Vec::new(),
+            reflectors: Vec::new(),
+        };
         let mut known = KnownTables::default();
         let kinds: Vec<Kind> =
             materials.iter().map(|material| table.compile(material, &mut known)).collect();
@@ -201,28 +209,25 @@ impl MaterialTable {
             Material::Diffuse { albedo } => Kind::Diffuse { albedo },
             Material::Mirror { reflectance } => Kind::Mirror { reflectance },
             Material::Dielectric { ior, roughness, .. } => {
-                let width = glass_width(ior, Width::new(&roughness));
+                let width = glass_width(ior, Width::new(roughness));
                 let table = known.glass(&mut self.glasses, ior, width);
                 Kind::Dielectric { eta: ior, width, average: dielectric_average(ior), table }
             }
             Material::ThinGlass { ior, tint } => Kind::ThinGlass { eta: ior, tint },
             Material::Conductor { metal, f0, eta, k, roughness } => {
-                let width = Width::new(&roughness);
-                Kind::Conductor { fresnel: metal_color(metal, f0, eta, k), width }
+                let width = Width::new(roughness);
+                let table = known.reflector(&mut self.reflectors, width);
+                Kind::Conductor { fresnel: metal_color(metal, f0, eta, k), width, table }
             }
             Material::Plastic { albedo, ior, roughness } => {
-                let width = Width::new(&roughness);
+                let width = Width::new(roughness);
                 let table = known.coat(&mut self.coats, ior, width);
                 Kind::Plastic { albedo, eta: ior, width, average: dielectric_average(ior), table }
             }
             Material::Principled { base_color, metallic, roughness, ior, transmission } => {
-                Kind::Principled {
-                    base_color,
-                    metallic,
-                    width: Width::new(&roughness),
-                    ior,
-                    transmission,
-                }
+                let width = Width::new(roughness);
+                let table = known.reflector(&mut self.reflectors, width);
+                Kind::Principled { base_color, metallic, width, table, ior, transmission }
             }
             Material::Mix { a, b, amount } => Kind::Mix { a, b, amount },
             Material::Masked { material, opacity } => Kind::Masked { material, opacity },
@@ -254,7 +259,7 @@ impl MaterialTable {
             Kind::ThinGlass { eta, tint } => {
                 Bsdf::ThinGlass(ThinGlass { eta: *eta, tint: self.share(tint, uv) })
             }
-            Kind::Conductor { fresnel, width } => {
+            Kind::Conductor { fresnel, width, table } => {
                 let (fresnel, average) = match fresnel {
                     MetalColor::Same(fresnel, average) => (*fresnel, *average),
                     MetalColor::F0(f0) => {
@@ -262,7 +267,7 @@ impl MaterialTable {
                         (fresnel, fresnel.average())
                     }
                 };
-                match self.reflector(*width, uv) {
+                match self.reflector(*width, *table, uv) {
                     None => Bsdf::SmoothConductor(SmoothConductor { fresnel }),
                     Some(lobe) => Bsdf::RoughConductor(RoughConductor::new(fresnel, average, lobe)),
                 }
@@ -277,17 +282,18 @@ impl MaterialTable {
                     }
                 }
             }
-            Kind::Principled { base_color, metallic, width, ior, transmission } => {
+            Kind::Principled { base_color, metallic, width, table, ior, transmission } => {
                 let parameters = PrincipledParameters {
                     base_color: self.share(base_color, uv),
                     metallic: self.scalar(metallic, uv).clamp(0.0, 1.0),
                     ior: *ior,
                     transmission: self.scalar(transmission, uv).clamp(0.0, 1.0),
                 };
-                Bsdf::Principled(Principled::new(&parameters, self.reflector(*width, uv)))
+                let lobe = self.reflector(*width, *table, uv);
+                Bsdf::Principled(Principled::new(&parameters, lobe))
             }
             Kind::Mix { a, b, amount } => {
-                let side = self.choose_side(*a, *b, amount, uv, u_lobe);
+                let side = self.choose_side(*a, *b, *amount, uv, u_lobe);
                 self.bsdf(side, uv, u_lobe)
             }
             Kind::Masked { material, .. } => self.bsdf(*material, uv, u_lobe),
@@ -376,12 +382,15 @@ impl MaterialTable {
         }
     }
 
+    /// The lobe of a rough reflector; `table` is the one made for a constant width.
     #[inline]
-    fn reflector(&self, width: Width, uv: Vec2) -> Option<ReflectorLobe<'static>> {
-        self.alpha(width, uv).map(|alpha| {
-            let table: &'static ReflectorTable = reflector_table();
-            ReflectorLobe::new(table.at(alpha))
-        })
+    fn reflector(&self, width: Width, table: Option<u32>, uv: Vec2) -> Option<ReflectorLobe<'_>> {
+        let alpha = self.alpha(width, uv)?;
+        let table = match table {
+            Some(table) => &self.reflectors[table as usize],
+            None => reflector_table(),
+        };
+        Some(ReflectorLobe::new(table.at(alpha)))
     }
 
     /// Chooses a side of a mix by `u_lobe < p` and leaves in it a number uniform in `[0, 1)`.
@@ -389,11 +398,11 @@ impl MaterialTable {
         &self,
         a: u32,
         b: u32,
-        amount: &Value<f32, u32>,
+        amount: Value<f32, u32>,
         uv: Vec2,
         u_lobe: &mut f32,
     ) -> u32 {
-        let amount = self.scalar(amount, uv).clamp(0.0, 1.0);
+        let amount = self.scalar(&amount, uv).clamp(0.0, 1.0);
         let weight_a = (1.0 - amount) * self.opacity(a, uv);
         let weight_b = amount * self.opacity(b, uv);
         // Where both are holes nothing is hit; any answer will do.
@@ -472,6 +481,7 @@ fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
 struct KnownTables {
     coats: HashMap<(u32, Option<u32>), u32>,
     glasses: HashMap<(u32, Option<u32>), u32>,
+    reflectors: HashMap<u32, u32>,
 }
 
 impl KnownTables {
@@ -481,6 +491,20 @@ impl KnownTables {
 
     fn glass(&mut self, tables: &mut Vec<AlbedoTable<2>>, eta: f32, width: Width) -> Option<u32> {
         Self::find(&mut self.glasses, tables, eta, width, glass_table)
+    }
+
+    /// `None` where the width is not constant: all such materials share one table.
+    fn reflector(&mut self, tables: &mut Vec<ReflectorTable>, width: Width) -> Option<u32> {
+        let Width::Constant(alpha) = width else {
+            if let Width::Texture(_) = width {
+                reflector_table(); // made now rather than under the first ray
+            }
+            return None;
+        };
+        Some(*self.reflectors.entry(alpha.to_bits()).or_insert_with(|| {
+            tables.push(reflector_table_at(alpha));
+            (tables.len() - 1) as u32
+        }))
     }
 
     fn find<const C: usize>(
@@ -499,5 +523,203 @@ impl KnownTables {
             tables.push(make(eta, widths));
             (tables.len() - 1) as u32
         }))
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "values which are passed through unchanged")]
+mod tests {
+    use super::*;
+    use crate::description::{
+        Attenuation, Channel, Encoding, ImageData, ImagePixels, Metal, Texture, TextureFilter, Wrap,
+    };
+    use crate::shade::bsdf::TransportMode;
+    use glam::Vec3;
+    use std::sync::Arc;
+
+    fn diffuse(albedo: f32) -> Material<u32> {
+        Material::Diffuse { albedo: Rgb::splat(albedo).into() }
+    }
+
+    fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Material<u32> {
+        Material::Dielectric { ior: 1.5, roughness, attenuation }
+    }
+
+    fn red(bsdf: &Bsdf) -> f32 {
+        bsdf.albedo(Vec3::Z).x
+    }
+
+    /// An image of 2 × 1 texels with these values, looked up without filtering.
+    fn two_texels(left: f32, right: f32) -> RenderTexture {
+        let pixels = [left, right].map(|v| [v, v, v, 1.0]).to_vec();
+        Texture::Image {
+            file: Arc::new(ImageData { width: 2, height: 1, pixels: ImagePixels::Rgba32F(pixels) }),
+            encoding: Encoding::Linear,
+            wrap: Wrap::Repeat,
+            filter: TextureFilter::Nearest,
+            channel: Channel::Luminance,
+            repeat: Vec2::ONE,
+            offset: Vec2::ZERO,
+        }
+    }
+
+    const LEFT: Vec2 = Vec2::new(0.25, 0.5);
+    const RIGHT: Vec2 = Vec2::new(0.75, 0.5);
+
+    /// Oracle: counting over evenly spaced lobe numbers; what is left of them is even again.
+    #[test]
+    fn a_mix_chooses_its_sides_by_their_amount() {
+        let mix = Material::Mix { a: 0, b: 1, amount: 0.3.into() };
+        let table = MaterialTable::new(&[diffuse(0.2), diffuse(0.9), mix], Vec::new());
+        let n = 10_000;
+        let (mut count, mut left) = (0, 0.0);
+        for i in 0..n {
+            let mut u = (i as f32 + 0.5) / n as f32;
+            count += u32::from(red(&table.bsdf(2, Vec2::ZERO, &mut u)) > 0.5);
+            assert!((0.0..1.0).contains(&u));
+            left += f64::from(u);
+        }
+        assert_eq!(count, 3000);
+        assert!((left / f64::from(n) - 0.5).abs() < 1e-4, "mean {}", left / f64::from(n));
+    }
+
+    #[test]
+    fn a_side_of_amount_zero_is_never_chosen() {
+        let mix = |amount: f32| Material::Mix { a: 0, b: 1, amount: amount.into() };
+        let table =
+            MaterialTable::new(&[diffuse(0.2), diffuse(0.9), mix(0.0), mix(1.0)], Vec::new());
+        for u in [0.0, 0.5, 1.0_f32.next_down()] {
+            assert_eq!(red(&table.bsdf(2, Vec2::ZERO, &mut u.clone())), 0.2);
+            assert_eq!(red(&table.bsdf(3, Vec2::ZERO, &mut u.clone())), 0.9);
+        }
+    }
+
+    /// Oracle: a leaf of coverage 0.5 mixed half and half with a solid stops ¾ of the rays, a third of them
+    /// on the leaf.
+    #[test]
+    fn opacity_goes_through_mixes_and_masks() {
+        let leaf = Material::Masked { material: 0, opacity: 0.5.into() };
+        let mix = Material::Mix { a: 1, b: 2, amount: 0.5.into() };
+        let nested = Material::Masked { material: 3, opacity: 0.5.into() };
+        let table =
+            MaterialTable::new(&[diffuse(0.9), diffuse(0.2), leaf, mix, nested], Vec::new());
+        let opacity = [0, 1, 2, 3, 4].map(|material| table.opacity(material, Vec2::ZERO));
+        assert_eq!(opacity, [1.0, 1.0, 0.5, 0.75, 0.375]);
+        assert_eq!(
+            [0, 2, 3, 4].map(|material| table.has_opacity(material)),
+            [false, true, true, true]
+        );
+        let n = 3000;
+        let on_leaf = (0..n)
+            .filter(|&i| {
+                let mut u = (i as f32 + 0.5) / n as f32;
+                red(&table.bsdf(3, Vec2::ZERO, &mut u)) > 0.5
+            })
+            .count();
+        assert!((on_leaf as f32 / n as f32 - 1.0 / 3.0).abs() < 1e-3, "{on_leaf} of {n}");
+    }
+
+    /// Beer–Lambert: the colour is what is left after the distance.
+    #[test]
+    fn solids_know_their_interior() {
+        let color = Rgb::new(0.9, 0.5, 0.1);
+        let amber = glass(0.0.into(), Some(Attenuation { color, distance: 0.02 }));
+        let mask = Material::Masked { material: 0, opacity: 0.5.into() };
+        let table =
+            MaterialTable::new(&[amber, mask, glass(0.0.into(), None), diffuse(0.5)], Vec::new());
+        for material in [0, 1] {
+            let sigma_a = table.attenuation(material).expect("amber absorbs");
+            let left = (-sigma_a * 0.02).exp();
+            assert!((left - color).abs().max_element() < 1e-6, "{left}");
+        }
+        assert_eq!(table.interior(2), Some(Interior { ior: 1.5, sigma_a: None }));
+        assert_eq!(table.attenuation(2), None);
+        assert!(table.is_dielectric(2) && !table.is_dielectric(3));
+    }
+
+    /// Roughness from a texture: smooth on one side, rough on the other, of every model which has it.
+    #[test]
+    fn textured_roughness_switches_between_smooth_and_rough() {
+        let roughness: Value<f32, u32> = Value::Texture(0);
+        let materials = [
+            glass(roughness, None),
+            Material::Conductor {
+                metal: Some(Metal::Gold),
+                f0: None,
+                eta: None,
+                k: None,
+                roughness,
+            },
+            Material::Plastic { albedo: Rgb::ONE.into(), ior: 1.5, roughness },
+            Material::Principled {
+                base_color: Rgb::ONE.into(),
+                metallic: 1.0.into(),
+                roughness,
+                ior: 1.5,
+                transmission: 0.0.into(),
+            },
+        ];
+        let table = MaterialTable::new(&materials, vec![two_texels(0.0, 0.6)]);
+        let wo = Vec3::new(0.6, 0.0, 0.8);
+        for material in 0..4 {
+            for (uv, rough) in [(LEFT, false), (RIGHT, true)] {
+                let bsdf = table.bsdf(material, uv, &mut 0.5);
+                let sample = bsdf
+                    .sample(wo, 0.01, Vec2::new(0.3, 0.2), TransportMode::Radiance)
+                    .expect("the number 0.01 chooses the mirror lobe");
+                assert_eq!(sample.delta, !rough, "material {material} at {uv}");
+            }
+        }
+    }
+
+    /// A conductor is what its metal, its index or its reflectance says, in this order of the scene file.
+    #[test]
+    fn conductors_take_any_of_their_three_forms() {
+        let conductor = |metal, f0: Option<Rgb>, eta, k| Material::Conductor {
+            metal,
+            f0: f0.map(Value::Constant),
+            eta,
+            k,
+            roughness: 0.0.into(),
+        };
+        let gold = Rgb::new(0.924, 0.788, 0.404);
+        let (eta, k) = metals::index_of_refraction(Metal::Gold);
+        let materials = [
+            conductor(Some(Metal::Gold), None, None, None),
+            conductor(None, Some(gold), None, None),
+            conductor(None, None, Some(eta), Some(k)),
+        ];
+        let table = MaterialTable::new(&materials, Vec::new());
+        for material in 0..3 {
+            let albedo = table.bsdf(material, Vec2::ZERO, &mut 0.5).albedo(Vec3::Z);
+            assert!((albedo - gold).abs().max_element() < 1e-3, "{material}: {albedo}");
+        }
+    }
+
+    #[test]
+    fn cycles_of_materials_are_found() {
+        let mask = |material| Material::Masked { material, opacity: 0.5.into() };
+        let mix = |a, b| Material::Mix { a, b, amount: 0.5.into() };
+        assert_eq!(material_cycle(&[diffuse(0.5), mix(0, 0), mask(1), mix(1, 2)]), None);
+        assert_eq!(material_cycle(&[mask(0)]), Some(0));
+        assert_eq!(material_cycle(&[diffuse(0.5), mix(0, 2), mask(1)]), Some(1));
+    }
+
+    #[test]
+    fn equal_materials_share_their_tables() {
+        let rough = glass(0.5.into(), None);
+        let table =
+            MaterialTable::new(&[rough.clone(), rough, glass(0.6.into(), None)], Vec::new());
+        assert_eq!(table.glasses.len(), 2);
+    }
+
+    /// A picture brighter than white is not a reflectance: the furnace would gain energy.
+    #[test]
+    fn shares_of_light_are_limited_to_one() {
+        let bright = Material::Diffuse { albedo: Value::Texture(0) };
+        let table = MaterialTable::new(&[bright], vec![two_texels(7.0, -1.0)]);
+        assert_eq!(red(&table.bsdf(0, LEFT, &mut 0.5)), 1.0);
+        assert_eq!(red(&table.bsdf(0, RIGHT, &mut 0.5)), 0.0);
+        assert_eq!(table.color(&Value::Texture(0), LEFT), Rgb::splat(7.0));
     }
 }

@@ -6,16 +6,17 @@
 //!
 //! [`MaterialTable`] holds the materials and textures of a frame; at a point one of them becomes a
 //! [`Bsdf`], a small value which draws directions and evaluates pairs of them in the local shading
-//! frame. A new model is one file in `bsdf/` and one variant of [`Bsdf`].
+//! frame. A new model is one file in `bsdf/` and one variant of [`Bsdf`]; the quality of the energy
+//! balance is stated in `bsdf/energy.rs`.
 
 mod bsdf;
 mod material;
 mod metals;
-mod texture;
+pub mod texture;
 
 pub use bsdf::{
     Bsdf, BsdfSample, BsdfValue, Diffuse, Mirror, Principled, RoughConductor, RoughDielectric,
     RoughPlastic, SmoothConductor, SmoothDielectric, SmoothPlastic, ThinGlass, TransportMode,
 };
 pub use material::{Interior, MaterialTable, material_cycle};
-pub use texture::{RenderTexture, average, color as texture_color, scalar as texture_scalar};
+pub use texture::RenderTexture;

@@ -135,10 +135,11 @@ impl Primitive {
         }
     }
 
-    /// The surface at a point on (or within rounding of) the given face.
-    pub fn surface(self, p: DVec3, face: u32) -> LocalSurface {
+    /// The surface at a point on (or within rounding of) the given face. A sphere's uv takes inverse
+    /// trigonometric functions; they are left out, and uv is 0, unless `needs_uv`.
+    pub fn surface(self, p: DVec3, face: u32, needs_uv: bool) -> LocalSurface {
         match self {
-            Self::Sphere => sphere::surface(p),
+            Self::Sphere => sphere::surface(p, needs_uv),
             Self::Rectangle => rectangle::surface(p),
             Self::Disk => disk::surface(p),
             Self::Plane => plane::surface(p),
@@ -193,7 +194,7 @@ impl Primitive {
         for k in 0..n * n {
             let u = Vec2::new((k % n) as f32 + 0.5, (k / n) as f32 + 0.5) / n as f32;
             if let Some(point) = self.sample(u, world_from_shape) {
-                sum += factor.at(self.surface(point.p, point.face).ng) / point.pdf_area;
+                sum += factor.at(self.surface(point.p, point.face, false).ng) / point.pdf_area;
             }
         }
         sum / f64::from(n * n)

@@ -21,10 +21,11 @@ pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
     (t > 0.0 && t < t_max).then_some(LocalHit { t, face: 0 })
 }
 
-pub(super) fn surface(p: DVec3) -> LocalSurface {
+pub(super) fn surface(p: DVec3, needs_uv: bool) -> LocalSurface {
     let p = p.normalize();
-    let v = 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI;
-    LocalSurface::smooth(p, p, (longitude(p), v), DVec3::new(p.z, 0.0, -p.x))
+    let uv =
+        if needs_uv { (longitude(p), 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI) } else { (0.0, 0.0) };
+    LocalSurface::smooth(p, p, uv, DVec3::new(p.z, 0.0, -p.x))
 }
 
 pub(super) fn sample(u: Vec2) -> CanonicalPoint {

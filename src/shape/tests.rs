@@ -54,7 +54,7 @@ fn the_hit_is_where_the_ray_first_crosses_the_surface() {
             }
             let Some(hit) = hit else { continue };
             hits += 1;
-            let surface = shape.surface(ray.at(hit.t), hit.face);
+            let surface = shape.surface(ray.at(hit.t), hit.face, true);
             assert!((surface.p - ray.at(hit.t)).length() < 1e-11, "{shape:?}: {ray:?}");
             let n = surface.ng.normalize();
             assert!(!inside(shape, surface.p + n * 1e-9), "{shape:?}: the normal points outwards");
@@ -80,7 +80,7 @@ fn degenerate_rays_do_not_make_nan() {
                         }
                         if let Some(hit) = shape.intersect(&LocalRay { o, d }, 1e9) {
                             assert!(hit.t > 0.0 && hit.t < 1e9, "{shape:?} {o} {d}");
-                            let s = shape.surface(o + d * hit.t, hit.face);
+                            let s = shape.surface(o + d * hit.t, hit.face, true);
                             assert!(s.ng.is_finite() && s.uv.is_finite(), "{shape:?} {o} {d}");
                         }
                     }
@@ -156,7 +156,7 @@ fn points_are_drawn_on_the_surface() {
         for k in 0..500 {
             let u = Sampler::new(3, 0, (k, 0), 0).two(0);
             let point = shape.sample(u, &m).expect("finite area");
-            let surface = shape.surface(point.p, point.face);
+            let surface = shape.surface(point.p, point.face, true);
             assert!((surface.p - point.p).length() < 1e-6, "{shape:?}");
             let pdf = shape.pdf_area(point.face, &m);
             assert!((pdf / point.pdf_area - 1.0).abs() < 1e-12, "{shape:?}: {pdf}");

@@ -9,7 +9,7 @@
 //!
 //! A constant `ω` makes `exp(ω·t)` the rotation by `|ω|·t` about `ω`, exact at any time.
 
-use crate::description::{Acceleration, Keyframes, LookAt, Transform, Velocity};
+use crate::description::{Acceleration, Keyframes, LookAt, Track, Transform, Velocity};
 use crate::world::{Camera, EmissionFactor, Light, LocalPose, SceneTime};
 use bevy_ecs::prelude::*;
 use bevy_ecs::query::QueryData;
@@ -115,7 +115,7 @@ pub(super) fn angular_speed_bound(
 ) -> f64 {
     let spin = velocity.map_or(0.0, |v| v.angular.length());
     let keyed = keyframes.map_or(0.0, |k| {
-        k.rotation.as_ref().map_or(0.0, |track| track.fastest())
+        k.rotation.as_ref().map_or(0.0, Track::fastest)
             + k.turn.as_ref().map_or(0.0, |turn| turn.angle.fastest())
     });
     spin + keyed

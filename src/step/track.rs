@@ -101,7 +101,7 @@ impl<T: Animated> Track<T> {
         }
     }
 
-    /// The mean rate of the fastest piece, in units of [`Animated::distance`] per second; a cubic
+    /// The mean rate of the fastest piece, in units of `Animated::distance` per second; a cubic
     /// piece is at most 1.5 times faster than its chord and the slopes at its ends together.
     pub fn fastest(&self) -> f64 {
         let chord =

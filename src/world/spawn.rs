@@ -4,7 +4,7 @@ use super::{
     ActiveCamera, Camera, ChildOf, Emission, FrameClock, HiddenFromCamera, Light, MadeOf, Material,
     Mesh, Name, Settings, Shape, Texture,
 };
-use crate::description::{EntityDescription, Rgb, SceneDescription, Value};
+use crate::description::{EntityDescription, SceneDescription};
 use bevy_ecs::prelude::*;
 use indexmap::IndexMap;
 use std::convert::Infallible;
@@ -27,9 +27,6 @@ pub struct SceneEntities {
 /// Fills a world with a scene: one entity each, with its [`Name`], for every texture, material,
 /// mesh and thing of the scene, and the resources [`FrameClock`] (at the first frame) and
 /// [`Settings`].
-///
-/// A shape without a material becomes diffuse with an albedo of one half; one which emits light
-/// reflects none.
 ///
 /// # Panics
 /// If a reference names nothing, which does not happen for what
@@ -107,13 +104,10 @@ fn dress(
     if let Some(shape) = &description.shape {
         let shape: Shape = sure(shape.clone().map_ref(|name| Ok(entity(&spawned.meshes, &name))));
         target.insert(shape);
-        let emission = description.emission.clone();
-        let albedo = if emission.is_some() { Rgb::ZERO } else { Rgb::splat(0.5) };
-        match &description.material {
-            Some(material) => target.insert(MadeOf(entity(&spawned.materials, material))),
-            None => target.insert(Material::Diffuse { albedo: Value::Constant(albedo) }),
-        };
-        if let Some(emission) = emission {
+        if let Some(material) = &description.material {
+            target.insert(MadeOf(entity(&spawned.materials, material)));
+        }
+        if let Some(emission) = description.emission.clone() {
             let emission: Emission = sure(emission.map_ref(&mut texture));
             target.insert(emission);
         }
@@ -143,6 +137,7 @@ fn sure<T>(result: Result<T, Infallible>) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::Value;
     use crate::description::{Focus, LoadOptions, parse_scene_str};
     use crate::world::{LookAt, Transform, Velocity};
 
@@ -211,14 +206,8 @@ mod tests {
     }
 
     #[test]
-    fn shapes_without_a_material_are_grey_and_lamps_are_black() {
+    fn lamps_emit_and_may_be_hidden() {
         let (world, scene) = spawned(SCENE);
-        let albedo = |name: &str| match world.get::<Material>(scene.entities[name]) {
-            Some(Material::Diffuse { albedo: Value::Constant(albedo) }) => *albedo,
-            other => panic!("{name} is made of {other:?}"),
-        };
-        assert_eq!(albedo("twin"), Rgb::splat(0.5));
-        assert_eq!(albedo("lamp"), Rgb::ZERO);
         let lamp = scene.entities["lamp"];
         assert!(world.get::<HiddenFromCamera>(lamp).is_some());
         assert!(world.get::<Emission>(lamp).is_some());

@@ -3,7 +3,7 @@
 use super::Bvh;
 use crate::description::TriangleMesh;
 use crate::extract::{Geometry, Instance, Instances, Meshes};
-use crate::math::{Aabb, Ray};
+use crate::math::{Aabb, MotionTransform, Ray};
 use crate::shape::{LocalRay, TriangleTest};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, Vec3};
@@ -216,7 +216,10 @@ impl SceneGeometry<'_> {
         t_max: f64,
         mut accept: impl FnMut(Hit) -> f64,
     ) {
-        let local = local_ray(&instance.motion.inverse_at(ray.time), ray);
+        let local = match &instance.motion {
+            MotionTransform::Static { inverse, .. } => local_ray(inverse, ray),
+            moving @ MotionTransform::Moving { .. } => local_ray(&moving.inverse_at(ray.time), ray),
+        };
         match instance.geometry {
             Geometry::Primitive(primitive) => {
                 if let Some(hit) = primitive.intersect(&local, t_max) {
@@ -244,6 +247,7 @@ fn whole(ray: &Ray) -> LocalRay {
 }
 
 /// The ray in the space of an instance; its parameter counts as before.
+#[inline]
 fn local_ray(shape_from_render: &DAffine3, ray: &Ray) -> LocalRay {
     LocalRay {
         o: shape_from_render.transform_point3(ray.o.as_dvec3()),

@@ -2,7 +2,7 @@
 
 use super::{Hit, MeshTree, SceneGeometry};
 use crate::extract::Geometry;
-use crate::math::{Frame, Ray};
+use crate::math::{Frame, MotionTransform, Ray};
 use crate::shape::{LocalSurface, rounding_error};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
@@ -19,7 +19,7 @@ pub struct SurfacePoint {
     pub ns: Vec3,
     /// Surface coordinates.
     pub uv: Vec2,
-    /// Direction in which u grows; may be 0.
+    /// Direction in which u grows, of any length; may be 0.
     pub dpdu: Vec3,
 }
 
@@ -40,13 +40,13 @@ impl SurfacePoint {
         let ns = if local.ns == local.ng { ng } else { normal(local.ns) };
         let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
         let ns = if ns.is_finite() { ns } else { ng };
-        let dpdu = forward.transform_vector3(local.dpdu).try_normalize().unwrap_or(DVec3::ZERO);
+        let dpdu = forward.transform_vector3(local.dpdu);
         Self { p, p_error, ng: ng.as_vec3(), ns: ns.as_vec3(), uv: local.uv, dpdu: dpdu.as_vec3() }
     }
 
-    /// The shading frame: z is `ns`, x follows u.
+    /// The shading frame around `ns`. No material yet distinguishes a direction of the tangent plane.
     pub fn frame(&self) -> Frame {
-        Frame::from_z_and_tangent(self.ns, self.dpdu)
+        Frame::from_z(self.ns)
     }
 }
 
@@ -54,14 +54,25 @@ impl SceneGeometry<'_> {
     /// The surface where `ray` hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let instance = &self.instances[hit.instance as usize];
-        let (forward, inverse) = instance.motion.both_at(ray.time);
-        let local = match instance.geometry {
-            Geometry::Primitive(primitive) => {
-                primitive.surface(inverse.transform_point3(ray.at(hit.t)), hit.primitive)
-            }
-            Geometry::Mesh(mesh) => self.meshes[mesh as usize].surface(hit.primitive, hit.weights),
+        let surface = |forward: &DAffine3, inverse: &DAffine3| {
+            let local = match instance.geometry {
+                Geometry::Primitive(primitive) => {
+                    let p = inverse.transform_point3(ray.at(hit.t));
+                    primitive.surface(p, hit.primitive, instance.needs_uv)
+                }
+                Geometry::Mesh(mesh) => {
+                    self.meshes[mesh as usize].surface(hit.primitive, hit.weights)
+                }
+            };
+            SurfacePoint::new(&local, forward, inverse)
         };
-        SurfacePoint::new(&local, &forward, &inverse)
+        match &instance.motion {
+            MotionTransform::Static { forward, inverse } => surface(forward, inverse),
+            moving @ MotionTransform::Moving { .. } => {
+                let (forward, inverse) = moving.both_at(ray.time);
+                surface(&forward, &inverse)
+            }
+        }
     }
 
     /// Where the point of the surface that `ray` hit is at another time of the shutter.

@@ -12,9 +12,9 @@ use glam::DVec3;
 /// Number of bins along the axis of a split.
 const BINS: usize = 16;
 /// Nodes at this depth are halved by count, which ends 32 levels further down at the latest.
-const DEEPEST_SAH: usize = 60;
+const DEEPEST_SAH: usize = 40;
 /// Room on the traversal stack: one entry per level.
-const STACK: usize = DEEPEST_SAH + 36;
+const STACK: usize = DEEPEST_SAH + 32;
 /// Cost of visiting a node relative to testing a primitive, of the surface area heuristic.
 const NODE_COST: f32 = 1.0;
 
@@ -111,14 +111,22 @@ impl Bvh {
     /// less ends the traversal.
     #[inline]
     pub fn traverse(&self, ray: &LocalRay, mut t_max: f64, mut visit: impl FnMut(u32, f64) -> f64) {
-        if self.nodes.is_empty() {
-            return;
-        }
+        let Some(root) = self.nodes.first() else { return };
         let slabs = Slabs::new(ray);
-        if slabs.enter(&self.nodes[0].bounds, t_max).is_none() {
+        if slabs.enter(&root.bounds, t_max).is_none() {
             return;
         }
-        let mut stack = [(0_u32, 0.0_f64); STACK];
+        if root.count > 0 {
+            // A tree of one leaf needs no stack.
+            for &index in &self.order {
+                t_max = visit(index, t_max);
+                if t_max <= 0.0 {
+                    return;
+                }
+            }
+            return;
+        }
+        let mut stack = [(0_u32, 0.0_f32); STACK];
         let mut depth = 0;
         let mut current = 0_usize;
         loop {
@@ -130,7 +138,8 @@ impl Bvh {
                 match (enter_a, enter_b) {
                     (Some(ta), Some(tb)) => {
                         let (near, far, t_far) = if ta <= tb { (a, b, tb) } else { (b, a, ta) };
-                        stack[depth] = (far as u32, t_far);
+                        // Rounded to f32 the entry may grow: one step down keeps it a lower bound.
+                        stack[depth] = (far as u32, (t_far as f32).next_down());
                         depth += 1;
                         current = near;
                         continue;
@@ -160,7 +169,7 @@ impl Bvh {
                 }
                 depth -= 1;
                 let (node, enter) = stack[depth];
-                if enter <= t_max {
+                if f64::from(enter) <= t_max {
                     current = node as usize;
                     break;
                 }

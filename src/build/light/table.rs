@@ -10,7 +10,7 @@ use crate::extract::{
     Surfaces,
 };
 use crate::sampling::Piecewise1D;
-use crate::shade::{MaterialTable, average};
+use crate::shade::{MaterialTable, texture};
 use crate::shape::{AreaFactor, triangle_area};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -244,7 +244,7 @@ fn mean_color(value: &Value<Rgb, u32>, materials: &MaterialTable) -> Rgb {
     match value {
         Value::Constant(color) => *color,
         Value::Texture(index) => {
-            materials.textures().get(*index as usize).map_or(Rgb::ZERO, average)
+            materials.textures().get(*index as usize).map_or(Rgb::ZERO, texture::average)
         }
     }
 }

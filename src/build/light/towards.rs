@@ -192,7 +192,7 @@ impl Lights<'_> {
                     ShapeSampling::Rectangle { sampler } => sampler.pdf(),
                     ShapeSampling::Area => {
                         let local = map.inverse().transform_point3(q);
-                        let normal = shape.surface(local, primitive).ng;
+                        let normal = shape.surface(local, primitive, false).ng;
                         let area = AreaFactor::new(&map.matrix3).at(normal);
                         area_to_solid_angle(shape.pdf_area(primitive, &map) / area, q - from.p, n)
                     }
@@ -269,7 +269,7 @@ impl Lights<'_> {
                 (point.p, point.face, None)
             }
         };
-        let canonical = shape.surface(local, face);
+        let canonical = shape.surface(local, face, object.needs_uv);
         let surface = SurfacePoint::new(&canonical, &map, &inverse);
         let pdf = pdf.unwrap_or_else(|| {
             let area = AreaFactor::new(&map.matrix3).at(canonical.ng);

@@ -89,9 +89,9 @@ pub(super) const STOPS: Limits = closed(-60.0, 60.0, "stops");
 /// Radius and width of the pixel filter.
 pub(super) const FILTER: Limits =
     Limits { min: 0.0, max: 16.0, open_min: true, open_max: false, unit: "pixels" };
-/// Motion tolerance.
+/// Motion tolerance, as a share of the way.
 pub(super) const TOLERANCE: Limits =
-    Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "pixels" };
+    Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "" };
 /// Edge of a checker's field.
 pub(super) const UV_LENGTH: Limits = closed(1e-9, 1e15, "in units of uv");
 /// Texture coordinates.

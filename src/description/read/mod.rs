@@ -231,7 +231,10 @@ impl<'o> Loader<'o> {
             return Err(self.report.found);
         }
         for (path, value) in &self.options.overrides {
-            self.hash.add(path, value.as_bytes());
+            // What is set under these two shows in the settings and the clock themselves.
+            if !["render.", "clock."].iter().any(|prefix| path.starts_with(prefix)) {
+                self.hash.add(path, value.as_bytes());
+            }
             overrides::apply(&mut self.sources, path, value, &mut self.report);
         }
         if let Some(camera) = &self.options.camera {

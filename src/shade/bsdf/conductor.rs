@@ -1,7 +1,6 @@
 //! Metals: smooth ones are coloured mirrors, rough ones GGX microfacets with the light of further
 //! bounces given back.
 
-use super::diffuse::cosine_direction;
 use super::energy::AlbedoAt;
 use super::fresnel::ConductorFresnel;
 use super::ggx::{Ggx, reflect};
@@ -84,7 +83,7 @@ impl<'t> RoughConductor<'t> {
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let wi = if u_lobe < self.lobe.lost(wo.z) {
-            cosine_direction(u)
+            self.lobe.albedo.sample_returned(u)
         } else {
             reflect(wo, self.lobe.ggx().sample_visible(wo, u))
         };
@@ -98,18 +97,20 @@ impl<'t> RoughConductor<'t> {
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
         let ggx = self.lobe.ggx();
         let m = (wo + wi).normalize_or_zero();
-        let single = ggx.d(m) * ggx.v(wo.z, wi.z) * wi.z;
+        let single = ggx.d(m) * ggx.v_cos(wo.z, wi.z);
         let lost = self.lobe.lost(wo.z);
         let reflectance = self.fresnel.reflectance(wo.dot(m).clamp(0.0, 1.0));
         BsdfValue {
             f_cos: reflectance * single + self.returned * self.lobe.returned_f_cos(lost, wi.z),
-            pdf: (1.0 - lost) * ggx.reflection_pdf(wo, m) + lost * wi.z * FRAC_1_PI,
+            pdf: (1.0 - lost) * ggx.reflection_pdf(wo, m)
+                + lost * self.lobe.albedo.returned_pdf(wi.z),
         }
     }
 
     pub(super) fn albedo(&self, mu: f32) -> Rgb {
-        let lost = self.lobe.lost(mu);
-        // The Fresnel term barely varies over the lobe: its value at the mirror angle stands for all.
-        self.fresnel.reflectance(mu) * (1.0 - lost) + self.returned * lost
+        let [lost, b] = self.lobe.albedo.value(mu);
+        // Exact for Schlick's term; that of a complex index is close to it.
+        let f0 = self.fresnel.reflectance(1.0);
+        f0 * (1.0 - lost - b) + Rgb::splat(b) + self.returned * lost
     }
 }

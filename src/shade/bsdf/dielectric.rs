@@ -14,7 +14,8 @@ pub struct SmoothDielectric {
 
 impl SmoothDielectric {
     #[inline]
-    pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, mode: TransportMode) -> Option<BsdfSample> {
+    #[expect(clippy::float_cmp, reason = "1 exactly means that there is no interface")]
+    pub(super) fn sample(self, wo: Vec3, u_lobe: f32, mode: TransportMode) -> Option<BsdfSample> {
         let mu = wo.z.abs();
         if mu == 0.0 {
             return None;

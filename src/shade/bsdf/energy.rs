@@ -12,19 +12,24 @@
 //! which is reciprocal and integrates to exactly what is missing. The albedos have no closed form:
 //! they are integrated once per table and looked up.
 //!
-//! `E` varies over `μ ~ α` and hardly beyond, so the nodes in `μ` are equidistant in
-//! `x = μ (1 + α) / (μ + α)`, in which curves of different `α` nearly coincide. Values are kept as
-//! `1 − E`, which stays accurate where `E` comes close to 1. Interpolation is linear in `x` and in `√α`.
+//! `1 − E` varies over `μ ~ α` and hardly beyond, Fresnel's reflectance over all `μ`, so the nodes in
+//! `μ` are equidistant in `x = ½ μ (1 + α) / (μ + α) + ½ √μ`, half of them for either. In the first term
+//! curves of different `α` nearly coincide. Values are kept as `1 − E`, which stays accurate where
+//! `E` comes close to 1. A table for all widths interpolates in `α^¼` as well;
+//! where the roughness is constant a table of one row spares that error.
 
 use super::fresnel::{dielectric, gauss_legendre, schlick_weight};
-use super::ggx::{Ggx, SMOOTH_BELOW_ALPHA, reflect};
+use super::ggx::{Ggx, SMOOTH_BELOW_ALPHA, reflect, refract};
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+use std::fmt;
 use std::sync::OnceLock;
 
 /// Nodes in `x`.
-const NODES: usize = 32;
+const NODES: usize = 48;
 /// Rows of a table over all widths.
-const ROWS: usize = 24;
+const ROWS: usize = 40;
 
 /// `C` functions of a cosine, for one width `α` or for all.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,12 +44,20 @@ struct Row<const C: usize> {
 }
 
 /// A table at one width: what a BSDF keeps.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct AlbedoAt<'t, const C: usize> {
     table: &'t AlbedoTable<C>,
     alpha: f32,
     row: u32,
     fraction: f32,
+    /// `1 / ln((1 + α)/α)`.
+    inverse_log: f32,
+}
+
+impl<const C: usize> fmt::Debug for AlbedoAt<'_, C> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "AlbedoAt {{ alpha: {}, .. }}", self.alpha)
+    }
 }
 
 impl<const C: usize> AlbedoTable<C> {
@@ -54,49 +67,63 @@ impl<const C: usize> AlbedoTable<C> {
     }
 
     /// A table for all widths from [`SMOOTH_BELOW_ALPHA`] to 1. `f(α, μ)` gives the values.
-    pub fn full(f: &impl Fn(f32, f32) -> [f64; C]) -> Self {
-        Self { rows: (0..ROWS).map(|row| Row::new(row_alpha(row), f)).collect() }
+    pub fn full(f: &(impl Fn(f32, f32) -> [f64; C] + Sync)) -> Self {
+        Self { rows: (0..ROWS).into_par_iter().map(|row| Row::new(row_alpha(row), f)).collect() }
     }
 
     /// The table at one width. A table made for a single width is taken as it is.
     #[inline]
     pub fn at(&self, alpha: f32) -> AlbedoAt<'_, C> {
+        let inverse_log = 1.0 / ((1.0 + alpha) / alpha).ln();
         if self.rows.len() == 1 {
-            return AlbedoAt { table: self, alpha, row: 0, fraction: 0.0 };
+            return AlbedoAt { table: self, alpha, row: 0, fraction: 0.0, inverse_log };
         }
-        let lowest = SMOOTH_BELOW_ALPHA.sqrt();
-        let x = (alpha.sqrt() - lowest) / (1.0 - lowest) * (ROWS - 1) as f32;
+        let lowest = SMOOTH_BELOW_ALPHA.sqrt().sqrt();
+        let x = (alpha.sqrt().sqrt() - lowest) / (1.0 - lowest) * (ROWS - 1) as f32;
         let row = (x as usize).min(ROWS - 2);
-        AlbedoAt { table: self, alpha, row: row as u32, fraction: x - row as f32 }
+        AlbedoAt { table: self, alpha, row: row as u32, fraction: x - row as f32, inverse_log }
     }
 }
 
 fn row_alpha(row: usize) -> f32 {
-    let lowest = f64::from(SMOOTH_BELOW_ALPHA).sqrt();
+    let lowest = f64::from(SMOOTH_BELOW_ALPHA).sqrt().sqrt();
     let root = lowest + (1.0 - lowest) * row as f64 / (ROWS - 1) as f64;
-    (root * root) as f32
+    root.powi(4) as f32
+}
+
+/// Where the cosine `mu` lies between the nodes, in `[0, 1]`.
+#[inline]
+fn coordinate(alpha: f32, mu: f32) -> f32 {
+    0.5 * (mu * (1.0 + alpha) / (mu + alpha) + mu.sqrt())
+}
+
+/// The cosine of a node: the inverse of [`coordinate`], which increases, by bisection.
+fn node_cosine(alpha: f32, node: usize) -> f32 {
+    let x = node as f32 / (NODES - 1) as f32;
+    let (mut low, mut high) = (0.0, 1.0);
+    // 40 halvings go below the spacing of f32 at the smallest node.
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if coordinate(alpha, middle) < x { low = middle } else { high = middle }
+    }
+    high
 }
 
 impl<const C: usize> Row<C> {
     fn new(alpha: f32, f: &impl Fn(f32, f32) -> [f64; C]) -> Self {
-        let values = std::array::from_fn(|node| {
-            let x = node as f32 / (NODES - 1) as f32;
-            f(alpha, alpha * x / (1.0 + alpha - x)).map(|v| v as f32)
-        });
+        let cosines: [f32; NODES] = std::array::from_fn(|node| node_cosine(alpha, node));
+        let values = cosines.map(|mu| f(alpha, mu).map(|v| v as f32));
         let mut row = Self { values, average: [0.0; C] };
-        // 2 ∫ v μ dμ of the interpolated curve, interval by interval: between nodes v is linear in
-        // x, and μ dμ/dx is smooth.
-        let rule = gauss_legendre::<8>();
+        // 2 ∫ v μ dμ of the interpolated curve, which is smooth between nodes.
+        let rule = gauss_legendre::<4>();
         let mut average = [0.0; C];
-        let a = f64::from(alpha);
-        for interval in 0..NODES - 1 {
+        for ends in cosines.windows(2) {
+            let (start, length) = (f64::from(ends[0]), f64::from(ends[1] - ends[0]));
             for (t, weight) in rule {
-                let x = (interval as f64 + t) / (NODES - 1) as f64;
-                let mu = a * x / (1.0 + a - x);
-                let dmu_dx = a * (1.0 + a) / (1.0 + a - x).powi(2);
-                let value = row.interpolate(x as f32);
+                let mu = start + length * t;
+                let value = row.interpolate(coordinate(alpha, mu as f32));
                 for (sum, v) in average.iter_mut().zip(value) {
-                    *sum += 2.0 * f64::from(v) * mu * dmu_dx * weight / (NODES - 1) as f64;
+                    *sum += 2.0 * f64::from(v) * mu * weight * length;
                 }
             }
         }
@@ -126,7 +153,7 @@ impl<const C: usize> AlbedoAt<'_, C> {
     /// The values at the cosine `mu` in `[0, 1]`.
     #[inline]
     pub fn value(&self, mu: f32) -> [f32; C] {
-        let x = mu * (1.0 + self.alpha) / (mu + self.alpha);
+        let x = coordinate(self.alpha, mu);
         self.blend(|row| row.interpolate(x))
     }
 
@@ -134,6 +161,27 @@ impl<const C: usize> AlbedoAt<'_, C> {
     #[inline]
     pub fn average(&self) -> [f32; C] {
         self.blend(|row| row.average)
+    }
+
+    /// Draws a direction for light which returns after several bounces: `z > 0`, with the density
+    /// [`AlbedoAt::returned_pdf`]. `u` in `[0, 1)²`.
+    ///
+    /// `(1 − E(μ)) μ` is what such light follows. At small widths `1 − E` falls like `(α/μ)²`
+    /// beyond `μ ~ α`, so that it leaves close to the horizon, where a cosine lobe hardly ever
+    /// looks. `ln(μ + α)` uniform keeps the weights bounded at every width.
+    #[inline]
+    pub fn sample_returned(&self, u: Vec2) -> Vec3 {
+        let mu = self.alpha * ((u.x / self.inverse_log).exp() - 1.0);
+        let mu = mu.clamp(f32::MIN_POSITIVE, 1.0);
+        let r = ((1.0 - mu) * (1.0 + mu)).sqrt();
+        let (sin, cos) = (TAU * u.y).sin_cos();
+        Vec3::new(r * cos, r * sin, mu)
+    }
+
+    /// `1 / (2π (μ + α) ln((1 + α)/α))`, per solid angle.
+    #[inline]
+    pub fn returned_pdf(&self, mu: f32) -> f32 {
+        self.inverse_log / (TAU * (mu + self.alpha))
     }
 
     #[inline]
@@ -157,21 +205,27 @@ pub(crate) type ReflectorTable = AlbedoTable<2>;
 /// The table of [`ReflectorTable`] for all widths, made at the first call.
 pub(crate) fn reflector_table() -> &'static ReflectorTable {
     static TABLE: OnceLock<ReflectorTable> = OnceLock::new();
-    TABLE.get_or_init(|| {
-        let rule = QuadratureRule::new();
-        AlbedoTable::full(&|alpha, mu| {
-            let mut sums = [0.0; 2];
-            rule.visible_normals(alpha, mu, |ggx, wo, m, weight| {
-                let wi = reflect(wo, m);
-                if wi.z > 0.0 {
-                    let out = weight * f64::from(ggx.shadowing(wo.z, wi.z));
-                    sums[0] += out;
-                    sums[1] += out * f64::from(schlick_weight(wo.dot(m)));
-                }
-            });
-            [lost(sums[0]), sums[1]]
-        })
-    })
+    TABLE.get_or_init(|| AlbedoTable::full(&reflector_albedo(&Lattice::COARSE)))
+}
+
+/// The table of [`ReflectorTable`] for one width.
+pub(crate) fn reflector_table_at(alpha: f32) -> ReflectorTable {
+    AlbedoTable::single(alpha, &reflector_albedo(&Lattice::FINE))
+}
+
+fn reflector_albedo(lattice: &Lattice) -> impl Fn(f32, f32) -> [f64; 2] {
+    |alpha, mu| {
+        let mut sums = [0.0; 2];
+        let n = lattice.visible_normals(alpha, mu, |ggx, wo, m| {
+            let wi = reflect(wo, m);
+            if wi.z > 0.0 {
+                let out = f64::from(ggx.shadowing(wo.z, wi.z));
+                sums[0] += out;
+                sums[1] += out * f64::from(schlick_weight(wo.dot(m)));
+            }
+        });
+        [lost(sums[0] / n), sums[1] / n]
+    }
 }
 
 /// Which widths a table is made for.
@@ -183,10 +237,19 @@ pub(crate) enum Widths {
     All,
 }
 
+impl Widths {
+    fn lattice(self) -> Lattice {
+        match self {
+            Self::One(_) => Lattice::FINE,
+            Self::All => Lattice::COARSE,
+        }
+    }
+}
+
 /// Albedo of single reflection at a rough dielectric coat of relative index `eta`.
 pub(crate) fn coat_table(eta: f32, widths: Widths) -> AlbedoTable<1> {
-    let rule = QuadratureRule::new();
-    let f = |alpha, mu| [dielectric_albedo(&rule, alpha, mu, eta).0];
+    let lattice = widths.lattice();
+    let f = |alpha, mu| [dielectric_albedo(&lattice, alpha, mu, eta).0];
     match widths {
         Widths::One(alpha) => AlbedoTable::single(alpha, &f),
         Widths::All => AlbedoTable::full(&f),
@@ -196,10 +259,10 @@ pub(crate) fn coat_table(eta: f32, widths: Widths) -> AlbedoTable<1> {
 /// What single scattering loses at a rough interface of glass with index `eta` over its
 /// surroundings: channel 0 for light from outside, channel 1 from inside.
 pub(crate) fn glass_table(eta: f32, widths: Widths) -> AlbedoTable<2> {
-    let rule = QuadratureRule::new();
+    let lattice = widths.lattice();
     let f = |alpha, mu| {
         [eta, 1.0 / eta].map(|eta| {
-            let (reflected, transmitted) = dielectric_albedo(&rule, alpha, mu, eta);
+            let (reflected, transmitted) = dielectric_albedo(&lattice, alpha, mu, eta);
             lost(reflected + transmitted)
         })
     };
@@ -215,63 +278,62 @@ fn lost(e: f64) -> f64 {
 }
 
 /// Shares of light from `mu` which a rough dielectric reflects and transmits once.
-fn dielectric_albedo(rule: &QuadratureRule, alpha: f32, mu: f32, eta: f32) -> (f64, f64) {
+fn dielectric_albedo(lattice: &Lattice, alpha: f32, mu: f32, eta: f32) -> (f64, f64) {
     let (mut reflected, mut transmitted) = (0.0, 0.0);
-    rule.visible_normals(alpha, mu, |ggx, wo, m, weight| {
+    let n = lattice.visible_normals(alpha, mu, |ggx, wo, m| {
         let cos = wo.dot(m);
         let interface = dielectric(cos, ((1.0 - cos) * (1.0 + cos)).max(0.0), eta);
         let f = f64::from(interface.reflectance);
         let wi = reflect(wo, m);
         if wi.z > 0.0 {
-            reflected += weight * f * f64::from(ggx.shadowing(wo.z, wi.z));
+            reflected += f * f64::from(ggx.shadowing(wo.z, wi.z));
         }
-        let wt = (cos / eta - interface.mu_t) * m - wo / eta;
+        let wt = refract(wo, m, eta);
         if f < 1.0 && wt.z < 0.0 {
-            transmitted += weight * (1.0 - f) * f64::from(ggx.shadowing(wo.z, -wt.z));
+            transmitted += (1.0 - f) * f64::from(ggx.shadowing(wo.z, -wt.z));
         }
     });
-    (reflected, transmitted)
+    (reflected / n, transmitted / n)
 }
 
-/// A product rule over the square which [`Ggx::sample_visible`] maps to visible normals.
-struct QuadratureRule {
-    polar: [(f64, f64); 20],
+/// A lattice over the square which [`Ggx::sample_visible`] maps to visible normals.
+///
+/// The integrands are continuous, with kinks along curves where the reflected or refracted ray meets
+/// the horizon and where total reflection begins. Product rules resolve such curves badly; a
+/// Fibonacci lattice covers them evenly from all directions (Niederreiter 1992, *Random Number
+/// Generation and Quasi-Monte Carlo Methods*, section 5.2).
+struct Lattice {
+    points: u32,
+    /// The Fibonacci number before `points`.
+    generator: u32,
 }
 
-impl QuadratureRule {
-    /// Points on the half circle. The integrand is periodic and even: the midpoint rule is exact for
-    /// all but high frequencies.
-    const AZIMUTHS: usize = 16;
+impl Lattice {
+    /// For one row: within 10⁻³, mostly far below.
+    const FINE: Self = Self { points: 987, generator: 610 };
+    /// For the rows of a table over all widths.
+    const COARSE: Self = Self { points: 377, generator: 233 };
 
-    fn new() -> Self {
-        Self { polar: gauss_legendre() }
-    }
-
-    /// Calls `f(distribution, wo, m, weight)` for every node; the weights sum to 1.
-    fn visible_normals(&self, alpha: f32, mu: f32, mut f: impl FnMut(Ggx, Vec3, Vec3, f64)) {
+    /// Calls `f(distribution, wo, m)` for every point of equal weight; returns the number of points.
+    fn visible_normals(&self, alpha: f32, mu: f32, mut f: impl FnMut(Ggx, Vec3, Vec3)) -> f64 {
         let ggx = Ggx { alpha };
         // At exactly grazing incidence the shadowing ratio is 0/0; its limit is reached long before.
         let mu = mu.max(1e-6 * alpha);
         let wo = Vec3::new(((1.0 - mu) * (1.0 + mu)).max(0.0).sqrt(), 0.0, mu);
-        // The reflected ray leaves through the horizon beyond some u₂, where the integrand has a
-        // kink. Seen along the normal that is u₂ = 1/(1 + α²): split there.
-        let split = 1.0 / (1.0 + f64::from(alpha * alpha));
-        for azimuth in 0..Self::AZIMUTHS {
-            let u1 = 0.5 * (azimuth as f32 + 0.5) / Self::AZIMUTHS as f32;
-            for (start, length) in [(0.0, split), (split, 1.0 - split)] {
-                for (t, weight) in self.polar {
-                    let u2 = start + length * t;
-                    let m = ggx.sample_visible(wo, Vec2::new(u1, u2 as f32));
-                    f(ggx, wo, m, weight * length / Self::AZIMUTHS as f64);
-                }
-            }
+        for i in 0..self.points {
+            let u2 = (i as f32 + 0.5) / self.points as f32;
+            // The integrand is even in the azimuth: half a turn, u₁ in [0, ½], is enough.
+            let u1 = 0.5 * (i * self.generator % self.points) as f32 / self.points as f32;
+            f(ggx, wo, ggx.sample_visible(wo, Vec2::new(u1, u2)));
         }
+        f64::from(self.points)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::shade::bsdf::statistics::{Random, direction};
 
     /// Oracle: directional albedos of GGX by high-order quadrature; at α = 1 and normal incidence it
     /// is `1 − ln 2`.
@@ -283,7 +345,7 @@ mod tests {
             (0.5, 1.0, 0.687_848_5),
             (0.75, 1.0, 0.463_916_5),
             (1.0, 1.0, 1.0 - std::f32::consts::LN_2),
-            (0.1, 0.5, 0.969_205_0),
+            (0.1, 0.5, 0.969_205),
             (0.25, 0.5, 0.857_263_4),
             (0.5, 0.5, 0.698_250_7),
             (1.0, 0.5, 0.450_693_9),
@@ -303,11 +365,11 @@ mod tests {
     /// inside, along the normal, it returns 0.754 in all.
     #[test]
     fn a_rough_interface_splits_light_as_it_should() {
-        let rule = QuadratureRule::new();
+        let lattice = Lattice::FINE;
         for (mu, reflected, transmitted) in
             [(1.0, 0.028_174_8, 0.939_931_7), (0.5, 0.043_935_4, 0.848_695_7)]
         {
-            let (r, t) = dielectric_albedo(&rule, 0.5, mu, 1.5);
+            let (r, t) = dielectric_albedo(&lattice, 0.5, mu, 1.5);
             assert!(
                 (r - reflected).abs() < 2e-4 && (t - transmitted).abs() < 2e-4,
                 "{mu}: {r} {t}"
@@ -318,8 +380,38 @@ mod tests {
                 "{mu}: {lost}"
             );
         }
-        let (r, t) = dielectric_albedo(&rule, 0.5, 1.0, 1.0 / 1.5);
+        let (r, t) = dielectric_albedo(&lattice, 0.5, 1.0, 1.0 / 1.5);
         assert!((r + t - 0.754).abs() < 1e-3, "{r} + {t}");
+    }
+
+    /// Oracle: drawing visible normals at random; 4 standard errors of 200 000 draws are below 4·10⁻³.
+    #[test]
+    fn glass_loses_what_a_simulation_loses() {
+        let mut random = Random::new(41);
+        let n = 200_000;
+        for (alpha, mu) in [(0.05, 0.1), (0.3, 0.65), (0.5, 0.7), (0.77, 0.35), (1.0, 0.01)] {
+            let ggx = Ggx { alpha };
+            let wo = direction(f64::from(mu), 0.0);
+            let one = glass_table(1.5, Widths::One(alpha)).at(alpha).value(mu);
+            for (side, eta) in [1.5, 1.0 / 1.5].into_iter().enumerate() {
+                let mut returned = 0.0;
+                for _ in 0..n {
+                    let m = ggx.sample_visible(wo, random.square());
+                    let cos = wo.dot(m).clamp(0.0, 1.0);
+                    let f = dielectric(cos, (1.0 - cos) * (1.0 + cos), eta).reflectance;
+                    let (wr, wt) = (reflect(wo, m), refract(wo, m, eta));
+                    if wr.z > 0.0 {
+                        returned += f64::from(f * ggx.shadowing(wo.z, wr.z));
+                    }
+                    if f < 1.0 && wt.z < 0.0 {
+                        returned += f64::from((1.0 - f) * ggx.shadowing(wo.z, -wt.z));
+                    }
+                }
+                let lost = 1.0 - returned / f64::from(n);
+                let difference = (f64::from(one[side]) - lost).abs();
+                assert!(difference < 4e-3, "α = {alpha}, μ = {mu}: {} and {lost}", one[side]);
+            }
+        }
     }
 
     /// A table over all widths agrees with the table made for one of them.
@@ -333,7 +425,7 @@ mod tests {
                 let (a, b) = (all.at(alpha).value(mu), one.at(alpha).value(mu));
                 for side in 0..2 {
                     let difference = (a[side] - b[side]).abs();
-                    assert!(difference < 2e-3, "α = {alpha}, μ = {mu}, side {side}: {a:?} {b:?}");
+                    assert!(difference < 5e-3, "α = {alpha}, μ = {mu}, side {side}: {a:?} {b:?}");
                 }
             }
         }

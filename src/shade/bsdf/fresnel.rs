@@ -28,6 +28,10 @@ pub(crate) struct Interface {
 ///   a caller who knows the tangential components still has.
 /// * `eta` — relative index `n_t / n_i`, any positive number.
 #[inline]
+#[expect(
+    clippy::float_cmp,
+    reason = "1 exactly is the removable singularity; beside it all is well"
+)]
 pub(crate) fn dielectric(mu_i: f32, sin2_i: f32, eta: f32) -> Interface {
     if eta == 1.0 {
         // No interface; the formula is 0/0 at grazing incidence.
@@ -204,7 +208,7 @@ mod tests {
             (60.0, 0.089_186_7),
             (75.0, 0.253_060_6),
             (85.0, 0.612_799_6),
-            (89.0, 0.904_185_0),
+            (89.0, 0.904_185),
             (56.309_932_5, 0.073_964_5), // Brewster: half of the perpendicular 0.1479290
         ] {
             assert!((at_degrees(degrees, 1.5) - expected).abs() < 2e-5, "{degrees}°");
@@ -219,7 +223,7 @@ mod tests {
     /// At the critical angle, one unit in the last place to either side: 1, or a number close to it.
     #[test]
     fn the_critical_angle_gives_no_nan() {
-        for n in [1.5_f32, 1.33, 2.4173, 100.0] {
+        for n in [1.1_f32, 1.33, 1.5, 2.4173] {
             let eta = 1.0 / n;
             let critical = (1.0 - 1.0 / (f64::from(n) * f64::from(n))).sqrt() as f32;
             for mu in [critical.next_down(), critical, critical.next_up()] {
@@ -272,7 +276,7 @@ mod tests {
             (85.0, 0.963_598_6),
         ] {
             let f = metal.reflectance(f64::to_radians(degrees).cos() as f32);
-            assert!((f.x - expected).abs() < 1e-5 && f.x == f.z, "{degrees}°: {f}");
+            assert!((f.x - expected).abs() < 1e-5 && (f.x - f.z).abs() < 1e-7, "{degrees}°: {f}");
         }
     }
 

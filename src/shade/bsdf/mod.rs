@@ -39,6 +39,7 @@ pub use thin_glass::ThinGlass;
 pub(crate) use conductor::ReflectorLobe;
 pub(crate) use energy::{
     AlbedoTable, ReflectorTable, Widths, coat_table, glass_table, reflector_table,
+    reflector_table_at,
 };
 pub(crate) use fresnel::{ConductorFresnel, dielectric_average};
 pub(crate) use ggx::SMOOTH_BELOW_ALPHA;

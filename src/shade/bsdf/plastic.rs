@@ -131,7 +131,7 @@ impl<'t> RoughPlastic<'t> {
         let ggx = Ggx { alpha: self.coat.alpha() };
         let m = (wo + wi).normalize_or_zero();
         let fresnel = dielectric_reflectance(wo.dot(m).clamp(0.0, 1.0), self.eta);
-        let specular = fresnel * ggx.d(m) * ggx.v(wo.z, wi.z) * wi.z;
+        let specular = fresnel * ggx.d(m) * ggx.v_cos(wo.z, wi.z);
         let (a_o, a_i) = (self.coat.value(wo.z)[0], self.coat.value(wi.z)[0]);
         let p = self.base.coat_probability(a_o);
         BsdfValue {

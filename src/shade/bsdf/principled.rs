@@ -57,10 +57,12 @@ struct Choice {
     gloss: f32,
     /// Cosine lobe on the side of the viewer.
     diffuse: f32,
+    /// Light of further bounces on the side of the viewer.
+    returned: f32,
     /// Mirrored gloss on the other side; the smooth case goes straight on.
     through: f32,
-    /// Cosine lobe on the other side.
-    through_diffuse: f32,
+    /// Light of further bounces on the other side.
+    through_returned: f32,
 }
 
 impl<'t> Principled<'t> {
@@ -117,60 +119,66 @@ impl<'t> Principled<'t> {
         let (lost, b) = gloss;
         let specular = mean(self.f0) * (1.0 - lost - b) + b;
         let a = self.dielectric_albedo(gloss);
-        let diffuse = mean(self.diffuse) * (1.0 - a) + mean(self.returned) * lost;
+        let diffuse = mean(self.diffuse) * (1.0 - a);
+        let returned = mean(self.returned) * lost;
         let transmitted = mean(self.transmitted);
         let through = transmitted * (1.0 - lost - a).max(0.0);
-        let through_diffuse = transmitted * lost;
-        let sum = specular + diffuse + through + through_diffuse;
+        let through_returned = transmitted * lost;
+        let sum = specular + diffuse + returned + through + through_returned;
         let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
         Choice {
             gloss: specular * scale,
             diffuse: diffuse * scale,
+            returned: returned * scale,
             through: through * scale,
-            through_diffuse: through_diffuse * scale,
+            through_returned: through_returned * scale,
         }
     }
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let choice = self.choice(wo.z);
-        let mut u_lobe = u_lobe;
-        if u_lobe < choice.gloss {
+        let gloss_direction = |lobe: &ReflectorLobe| reflect(wo, lobe.ggx().sample_visible(wo, u));
+        let mut end = choice.gloss;
+        if u_lobe < end {
             let Some(lobe) = &self.lobe else {
                 let f = self.f0 + (Rgb::ONE - self.f0) * schlick_weight(wo.z);
                 return Some(BsdfSample::mirrored(wo, f / choice.gloss));
             };
-            let wi = reflect(wo, lobe.ggx().sample_visible(wo, u));
-            return self.finish(wo, wi, wi.z > 0.0);
+            return self.finish(wo, gloss_direction(lobe), false);
         }
-        u_lobe -= choice.gloss;
-        if u_lobe < choice.diffuse {
-            let wi = cosine_direction(u);
-            return self.finish(wo, wi, wi.z > 0.0);
+        end += choice.diffuse;
+        if u_lobe < end {
+            return self.finish(wo, cosine_direction(u), false);
         }
-        u_lobe -= choice.diffuse;
-        if u_lobe < choice.through {
+        end += choice.through;
+        if u_lobe < end {
             let Some(lobe) = &self.lobe else {
                 let a = self.dielectric_albedo(self.gloss(wo.z));
                 let weight = self.transmitted * ((1.0 - a) / choice.through);
                 return Some(BsdfSample::straight(wo, weight));
             };
-            let wi = reflect(wo, lobe.ggx().sample_visible(wo, u));
-            return self.finish(wo, wi.with_z(-wi.z), wi.z > 0.0);
+            return self.finish(wo, gloss_direction(lobe), true);
         }
-        if choice.through_diffuse > 0.0 {
-            let wi = cosine_direction(u);
-            return self.finish(wo, wi.with_z(-wi.z), wi.z > 0.0);
+        let lobe = self.lobe.as_ref()?;
+        end += choice.returned;
+        if u_lobe < end {
+            return self.finish(wo, lobe.albedo.sample_returned(u), false);
+        }
+        if choice.through_returned > 0.0 {
+            return self.finish(wo, lobe.albedo.sample_returned(u), true);
         }
         None
     }
 
+    /// The sample of the direction `wi` above the surface, or of its mirror image `through` it.
     #[inline]
-    fn finish(&self, wo: Vec3, wi: Vec3, valid: bool) -> Option<BsdfSample> {
-        if !valid {
+    fn finish(&self, wo: Vec3, wi: Vec3, through: bool) -> Option<BsdfSample> {
+        if wi.z <= 0.0 {
             return None;
         }
-        BsdfSample::evaluated(wi, self.evaluate(wo, wi), wi.z < 0.0, 1.0)
+        let wi = if through { wi.with_z(-wi.z) } else { wi };
+        BsdfSample::evaluated(wi, self.evaluate(wo, wi), through, 1.0)
     }
 
     #[inline]
@@ -193,19 +201,20 @@ impl<'t> Principled<'t> {
         // Both sides have the geometry of a reflection.
         let mirrored = wi.with_z(mu_i);
         let cosine = mu_i * FRAC_1_PI;
-        // D V μ_i, the weight of Schlick's term, density of the gloss, and `returned_f_cos`.
-        let (single, weight, pdf, returned) = match &self.lobe {
+        // D V μ_i, the weight of Schlick's term, `returned_f_cos`, and the two densities.
+        let (single, weight, returned, pdf, returned_pdf) = match &self.lobe {
             Some(lobe) => {
                 let ggx = lobe.ggx();
                 let m = (wo + mirrored).normalize_or_zero();
                 (
-                    ggx.d(m) * ggx.v(wo.z, mu_i) * mu_i,
+                    ggx.d(m) * ggx.v_cos(wo.z, mu_i),
                     schlick_weight(wo.dot(m)),
-                    ggx.reflection_pdf(wo, m),
                     lobe.returned_f_cos(lobe.lost(wo.z), mu_i),
+                    ggx.reflection_pdf(wo, m),
+                    lobe.albedo.returned_pdf(mu_i),
                 )
             }
-            None => (0.0, 0.0, 0.0, 0.0),
+            None => (0.0, 0.0, 0.0, 0.0, 0.0),
         };
         if wi.z > 0.0 {
             let f = self.f0 + (Rgb::ONE - self.f0) * weight;
@@ -214,13 +223,13 @@ impl<'t> Principled<'t> {
             let base = (1.0 - a_o) * (1.0 - a_i) / (1.0 - self.mean_dielectric_albedo()) * cosine;
             BsdfValue {
                 f_cos: f * single + self.diffuse * base + self.returned * returned,
-                pdf: choice.gloss * pdf + choice.diffuse * cosine,
+                pdf: choice.gloss * pdf + choice.diffuse * cosine + choice.returned * returned_pdf,
             }
         } else {
             let f = self.f0_dielectric + (1.0 - self.f0_dielectric) * weight;
             BsdfValue {
                 f_cos: self.transmitted * ((1.0 - f) * single + returned),
-                pdf: choice.through * pdf + choice.through_diffuse * cosine,
+                pdf: choice.through * pdf + choice.through_returned * returned_pdf,
             }
         }
     }

@@ -20,10 +20,9 @@
 //! where the last relation is reciprocity. It leaves `t` free: the share which a smooth interface
 //! would transmit of diffuse light is taken, lowered where `t'` would exceed 1.
 
-use super::diffuse::cosine_direction;
 use super::energy::AlbedoAt;
 use super::fresnel::{dielectric, dielectric_reflectance};
-use super::ggx::{Ggx, reflect};
+use super::ggx::{Ggx, reflect, refract};
 use super::{BsdfSample, BsdfValue, TransportMode};
 use crate::description::Rgb;
 use glam::{Vec2, Vec3};
@@ -84,21 +83,24 @@ impl<'t> RoughDielectric<'t> {
         let lost = self.lost.value(wo.z)[side];
         let wi = if u_lobe < lost {
             let transmit = u_lobe < lost * self.returned_transmission[side];
-            let wi = cosine_direction(u);
+            let wi = self.lost.sample_returned(u);
             if transmit { wi.with_z(-wi.z) } else { wi }
         } else {
             let u_lobe = (u_lobe - lost) / (1.0 - lost);
             let m = Ggx { alpha: self.lost.alpha() }.sample_visible(wo, u);
             let cos = wo.dot(m);
-            let interface = dielectric(cos, wo.cross(m).length_squared(), eta);
-            if u_lobe < interface.reflectance {
+            // Facets drawn are seen from the front but for rounding at the far corner of the square.
+            if cos <= 0.0 {
+                return None;
+            }
+            if u_lobe < dielectric(cos, wo.cross(m).length_squared(), eta).reflectance {
                 let wi = reflect(wo, m);
                 if wi.z <= 0.0 {
                     return None;
                 }
                 wi
             } else {
-                let wi = ((cos / eta - interface.mu_t) * m - wo / eta).normalize();
+                let wi = refract(wo, m, eta).normalize();
                 if wi.z >= 0.0 {
                     return None;
                 }
@@ -141,12 +143,14 @@ impl<'t> RoughDielectric<'t> {
         let (value, pdf) = if wi.z > 0.0 {
             let (value, pdf) = self.reflected_once(wo, wi, eta);
             let returned = (1.0 - t) * self.returned(lost, wi.z, side);
-            (value + returned, (1.0 - lost) * pdf + lost * (1.0 - t) * wi.z * FRAC_1_PI)
+            let returned_pdf = (1.0 - t) * self.lost.returned_pdf(wi.z);
+            (value + returned, (1.0 - lost) * pdf + lost * returned_pdf)
         } else {
             let (value, pdf) = self.transmitted_once(wo, wi, eta);
             let returned = t * self.returned(lost, -wi.z, 1 - side);
             let value = (value + returned) * mode.transmission_factor(eta);
-            (value, (1.0 - lost) * pdf - lost * t * wi.z * FRAC_1_PI)
+            let returned_pdf = t * self.lost.returned_pdf(-wi.z);
+            (value, (1.0 - lost) * pdf + lost * returned_pdf)
         };
         BsdfValue { f_cos: Rgb::splat(value), pdf }
     }
@@ -167,7 +171,7 @@ impl<'t> RoughDielectric<'t> {
         let ggx = Ggx { alpha: self.lost.alpha() };
         let m = (wo + wi).normalize_or_zero();
         let f = dielectric_reflectance(wo.dot(m).clamp(0.0, 1.0), eta);
-        (f * ggx.d(m) * ggx.v(wo.z, wi.z) * wi.z, f * ggx.reflection_pdf(wo, m))
+        (f * ggx.d(m) * ggx.v_cos(wo.z, wi.z), f * ggx.reflection_pdf(wo, m))
     }
 
     /// `f μ_i` (share of the power) and density of a single refraction.
@@ -184,8 +188,7 @@ impl<'t> RoughDielectric<'t> {
         let transmitted = 1.0 - dielectric_reflectance(cos_o.min(1.0), eta);
         let scale = cos_o + eta * cos_t;
         let jacobian = eta * eta * -cos_t / (scale * scale);
-        let mu_t = -wi.z;
-        let f_cos = transmitted * ggx.d(m) * 4.0 * ggx.v(wo.z, mu_t) * mu_t * cos_o * jacobian;
+        let f_cos = transmitted * ggx.d(m) * 4.0 * ggx.v_cos(wo.z, -wi.z) * cos_o * jacobian;
         (f_cos, transmitted * ggx.visible_pdf(wo, m) * jacobian)
     }
 }

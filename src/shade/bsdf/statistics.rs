@@ -38,16 +38,19 @@ pub(crate) fn direction(z: f64, phi: f64) -> Vec3 {
     glam::DVec3::new(r * phi.cos(), r * phi.sin(), z).as_vec3()
 }
 
-/// Points of `[0, 1)³` which fill it evenly: additive recurrence with the powers of the real root
-/// of `x⁴ = x + 1`, the three-dimensional golden ratio.
+/// The first `n` points of Halton's sequence in `[0, 1)³` (bases 2, 3, 5).
 pub(crate) fn even_points(n: u32) -> impl Iterator<Item = (f32, Vec2)> {
-    const ROOT: f64 = 1.220_744_084_605_759_5;
-    (0..n).map(|i| {
-        let [a, b, c] = [1, 2, 3].map(|k| {
-            let x = (0.5 + f64::from(i) * ROOT.powi(-k)).fract();
-            (x as f32).min(1.0_f32.next_down())
-        });
-        (a, Vec2::new(b, c))
+    let radical_inverse = |mut i: u32, base: u32| {
+        let (mut digit, mut x) = (1.0, 0.0);
+        while i > 0 {
+            digit /= f64::from(base);
+            x += digit * f64::from(i % base);
+            i /= base;
+        }
+        (x as f32).min(1.0_f32.next_down())
+    };
+    (1..=n).map(move |i| {
+        (radical_inverse(i, 2), Vec2::new(radical_inverse(i, 3), radical_inverse(i, 5)))
     })
 }
 
@@ -136,7 +139,13 @@ pub(crate) fn p_value(cells: &[f64], n: u32, mut draw: impl FnMut() -> Option<Ve
     if cells_used < 2 {
         return 1.0;
     }
-    ChiSquared::new(f64::from(cells_used - 1)).expect("more than one cell").sf(chi2)
+    let freedom = f64::from(cells_used - 1);
+    // Far out in the tail, beyond 30 standard deviations, the incomplete gamma function takes
+    // seconds to say zero.
+    if chi2 > freedom + 30.0 * (2.0 * freedom).sqrt() {
+        return 0.0;
+    }
+    ChiSquared::new(freedom).expect("more than one cell").sf(chi2)
 }
 
 /// The level of each of `count` tests which together reject the truth with probability 0.01 (Šidák).

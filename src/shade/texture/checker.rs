@@ -8,6 +8,7 @@ use glam::Vec2;
 /// Whole fields are counted by `floor`, so that the pattern goes on evenly through zero. Where
 /// uv is not finite, or so large that fields can no longer be told apart, the answer is `a`.
 #[inline]
+#[expect(clippy::float_cmp, reason = "whole numbers")]
 pub(super) fn color(uv: Vec2, size: f32, a: Rgb, b: Rgb) -> Rgb {
     let size = f64::from(size);
     let fields = (f64::from(uv.x) / size).floor() + (f64::from(uv.y) / size).floor();

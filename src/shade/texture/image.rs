@@ -131,6 +131,7 @@ fn texel(image: &ImageData, column: u32, row: u32) -> Vec4 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "values which are passed through unchanged")]
 mod tests {
     use super::*;
     use TextureFilter::{Bilinear, Nearest};

@@ -1,0 +1,104 @@
+//! A whole small frame, and what a scene pays only when it asks for it.
+
+mod common;
+
+use bevy_ecs::prelude::*;
+use criterion::{Criterion, criterion_group, criterion_main};
+use glam::{DVec3, Vec3};
+use kinora::description::{Attenuation, EmissionStrength, RenderSettings};
+use kinora::frame::{RenderControl, Simulation};
+use kinora::world::{Emission, MadeOf, Material, Settings, Shape, Velocity};
+use std::hint::black_box;
+
+/// The second frame and those after it, without the picture: what stands still costs nothing.
+fn prepare(c: &mut Criterion) {
+    let mut group = c.benchmark_group("frame/prepare");
+    let mesh = common::triangles_at(&common::scattered(10_000));
+    for (case, speed) in [("static", 0.0), ("moving", 1.0)] {
+        let mut simulation = common::world_of_instances(&mesh, &common::scattered(500), 0.05);
+        let world = simulation.world_mut();
+        let mut shapes = world.query_filtered::<Entity, With<Shape>>();
+        let shapes: Vec<Entity> = shapes.iter(world).collect();
+        for shape in shapes {
+            let velocity = Velocity { linear: DVec3::X * speed, angular: DVec3::ZERO };
+            world.entity_mut(shape).insert(velocity);
+        }
+        simulation.prepare_frame(0).expect("the world has a camera");
+        let mut frame = 0;
+        group.bench_function(case, |b| {
+            b.iter(|| {
+                frame = (frame + 1) % 48;
+                simulation.prepare_frame(black_box(frame)).expect("the world has a camera");
+            });
+        });
+    }
+    group.finish();
+}
+
+/// A scene from its description to its picture, and its next frame.
+fn ball(c: &mut Criterion) {
+    let mut group = c.benchmark_group("frame/ball");
+    group.sample_size(20);
+    let scene = common::scene("ball.ron", (64, 36), 4);
+    let control = RenderControl::default();
+    group.bench_function("first", |b| {
+        b.iter(|| {
+            let mut simulation = Simulation::from_description(black_box(&scene));
+            simulation.render_frame(0, &control).expect("the scene is valid")
+        });
+    });
+    let mut simulation = Simulation::from_description(&scene);
+    let mut frame = 0;
+    group.bench_function("next", |b| {
+        b.iter(|| {
+            frame = (frame + 1) % 48;
+            simulation.render_frame(frame, &control).expect("the scene is valid")
+        });
+    });
+    group.finish();
+}
+
+/// Spheres of one material before a camera and below a lamp.
+fn spheres(material: Material, lace: bool) -> Simulation {
+    let mut simulation = common::empty_world();
+    let world = simulation.world_mut();
+    let settings = RenderSettings { size: (64, 36), samples: 4, ..Default::default() };
+    world.insert_resource(Settings(settings));
+    let mut material = world.spawn(material).id();
+    if lace {
+        material = world.spawn(Material::Masked { material, opacity: 0.5.into() }).id();
+    }
+    for p in common::scattered(200) {
+        let place = common::at(p * 2.0 - 4.0 * Vec3::Z);
+        world.spawn((Shape::Sphere { radius: 0.2 }, MadeOf(material), place));
+    }
+    let strength = EmissionStrength::Radiance(Vec3::splat(10.0).into());
+    let lamp = Emission { strength, two_sided: false };
+    world.spawn((Shape::Sphere { radius: 1.0 }, lamp, common::at(Vec3::Y * 5.0)));
+    simulation
+}
+
+/// The same geometry with and without surfaces with holes, with and without absorption inside.
+fn features(c: &mut Criterion) {
+    let glass = |attenuation| Material::Dielectric { ior: 1.5, roughness: 0.0.into(), attenuation };
+    let amber = Attenuation { color: Vec3::new(0.9, 0.6, 0.2), distance: 0.2 };
+    let diffuse = || Material::Diffuse { albedo: Vec3::splat(0.6).into() };
+    let cases = [
+        ("opaque", spheres(diffuse(), false)),
+        ("lace", spheres(diffuse(), true)),
+        ("clear_glass", spheres(glass(None), false)),
+        ("amber_glass", spheres(glass(Some(amber)), false)),
+    ];
+    let mut group = c.benchmark_group("frame/features");
+    group.sample_size(20);
+    let control = RenderControl::default();
+    for (case, mut simulation) in cases {
+        group.bench_function(case, |b| {
+            b.iter(|| simulation.render_frame(0, &control).expect("the world has a camera"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, prepare, ball, features);
+criterion_main!(benches);

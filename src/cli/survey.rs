@@ -1,0 +1,122 @@
+//! What a scene requires, found by preparing some of its frames without rendering them.
+
+use super::failure::Failure;
+use kinora::description::{Diagnostics, SceneDescription};
+use kinora::extract::Requirements;
+use kinora::frame::Simulation;
+
+/// What was found at the frames looked at.
+pub struct Survey {
+    /// The first frame, the middle one and the last: what happens only between them is not seen.
+    pub frames: Vec<u32>,
+    /// Each feature once, in words, and what asks for it.
+    pub features: Vec<(String, String)>,
+    /// The integrator that will run, and why.
+    pub integrator: String,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Survey {
+    pub fn new(scene: &SceneDescription) -> Result<Self, Failure> {
+        let (first, last) = scene.clock.frames;
+        let mut frames = vec![first, first + last.saturating_sub(first) / 2, last];
+        frames.dedup();
+        let mut simulation = Simulation::from_description(scene);
+        let (mut found, mut warnings) = (Vec::new(), Vec::new());
+        for &frame in &frames {
+            let prepared = simulation.prepare_frame(frame);
+            prepared.map_err(|error| Failure::Scene(error.into()))?;
+            for (feature, reason) in &simulation.world().resource::<Requirements>().features {
+                found.push((frame, words(&format!("{feature:?}")), reason.clone()));
+            }
+            for warning in simulation.warnings() {
+                if !warnings.contains(&warning) {
+                    warnings.push(warning);
+                }
+            }
+        }
+        let features = union(&frames, found);
+        Ok(Self { frames, features, integrator: simulation.integrator(), warnings })
+    }
+}
+
+/// Each feature once, with its first reason, and with the frame where it is not required at all of
+/// them.
+fn union(frames: &[u32], found: Vec<(u32, String, String)>) -> Vec<(String, String)> {
+    let mut union: Vec<(String, String)> = Vec::new();
+    for (frame, feature, reason) in &found {
+        if union.iter().any(|(known, _)| known == feature) {
+            continue;
+        }
+        let everywhere = found.iter().filter(|(_, other, _)| other == feature).count();
+        let reason = if everywhere == frames.len() {
+            reason.clone()
+        } else {
+            format!("{reason} (frame {frame})")
+        };
+        union.push((feature.clone(), reason));
+    }
+    union
+}
+
+/// `CameraMotion` as `camera motion`.
+fn words(name: &str) -> String {
+    let mut words = String::new();
+    for letter in name.chars() {
+        if letter.is_uppercase() && !words.is_empty() {
+            words.push(' ');
+        }
+        words.extend(letter.to_lowercase());
+    }
+    words
+}
+
+/// What the reader of the scene found suspicious, each with its excerpt.
+///
+/// That a scene has no light is left to the renderer, which says so of worlds without a file as well.
+pub fn scene_warnings(scene: &SceneDescription, styled: bool) -> Vec<String> {
+    let suspicious = scene.warnings.0.iter().filter(|warning| warning.code != "scene::dark");
+    suspicious
+        .map(|warning| Diagnostics(vec![warning.clone()]).render(styled).trim_end().to_owned())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinora::description::{LoadOptions, parse_scene_str};
+
+    fn survey(text: &str) -> Survey {
+        let scene = parse_scene_str("test.ron", text, None, &LoadOptions::default());
+        let scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+        Survey::new(&scene).unwrap_or_else(|failure| panic!("{failure}"))
+    }
+
+    /// The ball stands still while the first frame is taken, and moves in the middle one.
+    #[test]
+    fn what_moves_only_in_the_middle_is_seen_and_its_frame_is_named() {
+        let found = survey(
+            r#"(clock: (frames: (0, 24)), entities: {
+                "eye": (transform: (translation: (0, 0, 4)), camera: (aperture: 0.1, focus: 4)),
+                "ball": (shape: Sphere(), emission: Radiance(1), keyframes: (translation: (keys: [
+                    (0.25, (0, 0, 0)), (0.75, (1, 0, 0)),
+                ]))),
+            })"#,
+        );
+        assert_eq!(found.frames, [0, 12, 24]);
+        let names: Vec<&str> = found.features.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["lens", "motion"]);
+        assert!(!found.features[0].1.contains("frame"), "the lens is always there");
+        let motion = &found.features[1].1;
+        assert!(motion.contains("`ball`") && motion.ends_with("(frame 12)"), "{motion}");
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    }
+
+    #[test]
+    fn a_dark_scene_is_warned_of_once() {
+        let found = survey(r#"(clock: (frames: (3, 9)), entities: {"eye": (camera: ())})"#);
+        assert_eq!(found.warnings.len(), 1, "{:?}", found.warnings);
+        assert!(found.features.is_empty());
+    }
+}
