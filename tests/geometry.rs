@@ -69,6 +69,7 @@ fn instance(geometry: Geometry, local: Aabb, keys: &[DAffine3]) -> Instance {
         emission: NOTHING,
         object_id: 1,
         hidden_from_camera: false,
+        needs_uv: true,
     }
 }
 
