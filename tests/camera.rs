@@ -218,7 +218,7 @@ fn four_colors(text: &str, size: (u32, u32)) -> Picture {
 #[test]
 fn pictures_are_the_right_way_round() {
     const COLORS: [Vec3; 4] = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
-    let quad = r#"(0.5, 0.5, 0), (-0.5, 0.5, 0), (-0.5, -0.5, 0), (0.5, -0.5, 0)"#;
+    let quad = r"(0.5, 0.5, 0), (-0.5, 0.5, 0), (-0.5, -0.5, 0), (0.5, -0.5, 0)";
     let mesh = format!(
         r#"meshes: {{"quad": Triangles(positions: [{quad}], uvs: [(1, 1), (0, 1), (0, 0), (1, 0)], triangles: [(0, 1, 2), (0, 2, 3)])}}, entities"#
     );

@@ -128,22 +128,16 @@ fn a_world_changed_between_frames_equals_a_new_one() {
     let named = |simulation: &mut Simulation, name: &str| {
         let world = simulation.world_mut();
         let mut names = world.query::<(bevy_ecs::prelude::Entity, &Name)>();
-        names
-            .iter(world)
-            .find(|(_, n)| n.as_str() == name && true)
-            .map(|(entity, _)| entity)
-            .expect(name)
+        names.iter(world).find(|(_, n)| n.as_str() == name).map(|(entity, _)| entity).expect(name)
     };
     let change = |simulation: &mut Simulation| {
         let lamp = named(simulation, "lamp");
-        let net = named(simulation, "net");
         let world = simulation.world_mut();
         world.entity_mut(lamp).insert(Emission {
             strength: EmissionStrength::Radiance(Value::Constant(Rgb::new(1.0, 9.0, 1.0))),
             two_sided: true,
         });
         world.get_mut::<Transform>(lamp).expect("placed").translation.x = 1.0;
-        let _ = net;
         let point = named(simulation, "point");
         simulation.world_mut().entity_mut(point).despawn();
         let floor = {

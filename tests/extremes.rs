@@ -280,7 +280,7 @@ fn no_sample_is_ever_not_a_number() {
                 "point": (transform: (translation: (0, 1, 0)), light: Point(intensity: (1, 1, 1))),
                 "on the floor": (transform: (translation: (1, 0, 1)), light: Point(intensity: (1, 1, 1))),
                 "spot": (transform: (translation: (0, 2, 2), look_at: (0, 0, 0)), light: Spot(intensity: (1, 1, 1), angle: 1, blend: 1)),
-                "sun": (light: Directional(irradiance: (1, 1, 1), angle: 180)),
+                "sun": (light: Directional(irradiance: (1, 1, 1), angle: 179.9)),
                 "sky": (light: Sky(radiance: "holes")),
             }})"#
         );

@@ -235,7 +235,9 @@ fn no_lossless_material_can_be_seen_in_an_even_sky() {
         // A map takes longer to prepare than to see: every third material under it.
         let every = if sky == "(1, 1, 1)" { 1 } else { 3 };
         for (name, material, tables) in LOSSLESS.into_iter().step_by(every) {
-            let picture = render(&under_sky(material, "Sphere()", sky), (12, 12), 128);
+            // Rough glass is noisy: some paths bounce inside for long.
+            let samples = if tables > 0.0 { 512 } else { 64 };
+            let picture = render(&under_sky(material, "Sphere()", sky), (12, 12), samples);
             for (k, (value, variance)) in picture.green().iter().zip(picture.variance()).enumerate()
             {
                 let bound = 6.0 * variance.sqrt() + tables + 2e-5;
@@ -307,14 +309,13 @@ fn coarse_meshes_with_smooth_normals_have_no_rims() {
     assert!(diffuse.mean().mean >= 0.97, "{:?}", diffuse.mean());
 }
 
-/// Oracle: twenty glass shells in one another, forty interfaces on the way in and forty on the way
-/// out, are invisible: neither the depth nor roulette loses light.
+/// Oracle: twenty glass shells in one another, each of two thin panes, are invisible: neither the depth
+/// nor roulette loses light on the way through eighty panes.
 #[test]
 fn twenty_nested_glass_shells_are_invisible() {
-    let shells: String = (0..20)
+    let shells: Vec<String> = (0..20)
         .map(|k| {
             let outer = 1.0 - 0.04 * f64::from(k);
-            // The inner wall of a shell is glass turned inside out: its inside is air.
             format!(
                 r#""outer {k}": (shape: Sphere(radius: {outer}), material: "pane"),
                    "inner {k}": (shape: Sphere(radius: {}), material: "pane"),"#,
@@ -322,6 +323,7 @@ fn twenty_nested_glass_shells_are_invisible() {
             )
         })
         .collect();
+    let shells = shells.concat();
     let text = format!(
         r#"(
         render: (filter: Box(), max_depth: 2000),

@@ -5,6 +5,7 @@ mod common;
 
 use common::{Picture, render, render_description, scene};
 use glam::{DAffine3, DQuat, DVec3};
+use kinora::description::{Extend, Interpolation, Key, Keyframes, Track};
 
 /// Emitters in the dark before an orthographic camera of 1 pixel per metre, over a shutter of one second.
 fn before_camera(pixels: u32, things: &str) -> String {
@@ -168,7 +169,6 @@ fn a_moving_child_of_a_moving_parent_equals_the_motion_flattened() {
         r#""wheel": (transform: (), shape: Box(size: (1.2, 0.3, 0.3)), emission: Radiance((2, 2, 2)))"#,
     );
     let mut flat = scene(&flat);
-    use kinora::description::{Extend, Interpolation, Key, Keyframes, Track};
     let times: Vec<f64> = (0..=64).map(|k| 0.3 + 0.1 * f64::from(k) / 64.0).collect();
     let translation = times
         .iter()
@@ -328,6 +328,7 @@ fn one_path_has_one_time() {
             entities: {{
                 "ship": ({velocity}),
                 "camera": (parent: "ship", transform: (translation: (0, 1, 4), look_at: (0, 0, 0)), camera: (fov: 40)),
+                "wall": (parent: "ship", transform: (translation: (-0.8, 0.6, 0), rotation: (0, 60, 0)), shape: Rectangle(size: (3, 3)), material: "white"),
                 "mirror": (parent: "ship", transform: (rotation: (-90, 0, 0)), shape: Rectangle(size: (3, 3)), material: "mirror"),
                 "ball": (parent: "ship", transform: (translation: (0, 0.5, 0)), shape: Sphere(radius: 0.4), material: "white"),
                 "lamp": (parent: "ship", transform: (translation: (1, 2, 1)), shape: Sphere(radius: 0.2), emission: Radiance((9, 9, 9))),

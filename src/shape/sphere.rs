@@ -51,8 +51,7 @@ impl ConeOfSphere {
         let to_centre = centre - p;
         let distance = to_centre.length();
         let sin_max = radius / distance;
-        // The negation also catches NaN.
-        if !(distance - error > radius * (1.0 + f64::from(f32::EPSILON))) {
+        if distance.is_nan() || distance - error <= radius * (1.0 + f64::from(f32::EPSILON)) {
             return None;
         }
         // 1 − cos θ = sin²θ/(1 + cos θ) keeps its digits for a narrow cone.

@@ -1,7 +1,9 @@
 //! Which light a sample goes to.
 //!
-//! Lights infinitely far away are one group, all others another; the groups are taken in proportion to
-//! their power. Within the first a light is chosen by power, within the second by the tree. Choosing
+//! Lights infinitely far away are one group, all others another. How much of the first enters the scene
+//! grows with the scene, so that it has no flux to be compared with that of lamps, and one huge object
+//! would starve all lamps: the groups share the choices evenly. Within the first a light is chosen by
+//! the irradiance that it brings, within the second by the tree. Choosing
 //! those by power as well was measured against it: already for 10 equal lights in a hall the tree's
 //! relative error is a fifth (0.042 for 0.237 at 16 samples), for 8 % more time.
 
@@ -19,15 +21,15 @@ pub struct LightChoice {
 }
 
 impl LightChoice {
-    /// A choice among lights at a place and then lights of these powers infinitely far away.
+    /// A choice among lights at a place and then lights infinitely far away, which bring this much
+    /// irradiance each.
     pub fn new(near: &[LightBounds], far: &[f64]) -> Self {
         let near_power: f64 = near.iter().map(|light| light.flux).sum();
         let far_power: f64 = far.iter().sum();
-        let far_share = match (near.is_empty(), far.is_empty()) {
-            (_, true) => 0.0,
-            (true, false) => 1.0,
-            (false, false) if near_power + far_power > 0.0 => far_power / (near_power + far_power),
-            (false, false) => 0.5,
+        let far_share = match (near_power > 0.0, far_power > 0.0) {
+            (_, false) => 0.0,
+            (false, true) => 1.0,
+            (true, true) => 0.5,
         };
         Self {
             near: LightTree::new(near),

@@ -3,7 +3,7 @@
 use super::SkyLight;
 use super::choice::LightChoice;
 use super::tree::{Cone, LightBounds};
-use crate::build::bvh::{MeshTree, MeshTrees, TopLevel};
+use crate::build::bvh::{MeshTree, MeshTrees};
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
@@ -80,7 +80,6 @@ pub fn rebuild_light_table(
     surfaces: Res<Surfaces>,
     punctual: Res<PunctualLights>,
     meshes: Res<MeshTrees>,
-    top: Res<TopLevel>,
     mut table: ResMut<LightTable>,
 ) {
     let emitters_may_have_moved = instances.is_changed();
@@ -94,11 +93,7 @@ pub fn rebuild_light_table(
     for (index, instance) in (0..).zip(&instances.list) {
         builder.add_instance(index, instance, &surfaces, &meshes);
     }
-    let bounds = top.bounds();
-    // Light from infinitely far away is compared with lamps by what it sends through the scene's
-    // bounding sphere; without bounded objects any radius does.
-    let radius = if bounds.is_empty() { 1.0 } else { (bounds.max - bounds.min).length() * 0.5 };
-    builder.add_punctual(&punctual.0, &surfaces.materials, f64::from(radius));
+    builder.add_punctual(&punctual.0, &surfaces.materials);
     *table = builder.finish();
 }
 
@@ -177,13 +172,7 @@ impl Builder {
         self.table.first_of_instance.push(first);
     }
 
-    fn add_punctual(
-        &mut self,
-        lights: &[PunctualLight],
-        materials: &MaterialTable,
-        scene_radius: f64,
-    ) {
-        let disk = PI * scene_radius * scene_radius;
+    fn add_punctual(&mut self, lights: &[PunctualLight], materials: &MaterialTable) {
         self.table.of_punctual = vec![NOTHING; lights.len()];
         self.table.skies = vec![None; lights.len()];
         for (index, light) in (0..).zip(lights) {
@@ -210,19 +199,19 @@ impl Builder {
             self.table.of_punctual[index as usize] = self.add_near(Emitter::Punctual(index), light);
         }
         for (index, light) in (0..).zip(lights) {
-            let power = match light.light {
-                Light::Directional { irradiance, .. } => f64::from(luminance(irradiance)) * disk,
+            let irradiance = match light.light {
+                Light::Directional { irradiance, .. } => f64::from(luminance(irradiance)),
                 Light::Sky { radiance, scale } => {
                     let sky = SkyLight::new(radiance, scale, materials);
-                    let flux = sky.mean_radiance() * 4.0 * PI * disk;
+                    let irradiance = sky.mean_radiance() * 4.0 * PI;
                     self.table.skies[index as usize] = Some(sky);
-                    flux
+                    irradiance
                 }
                 Light::Point { .. } | Light::Spot { .. } => continue,
             };
             self.table.of_punctual[index as usize] = self.table.emitters.len() as u32;
             self.table.emitters.push(Emitter::Punctual(index));
-            self.far.push(if power.is_finite() { power } else { 0.0 });
+            self.far.push(if irradiance.is_finite() { irradiance } else { 0.0 });
         }
     }
 
