@@ -66,7 +66,9 @@ fn tables(c: &mut Criterion) {
     let mut group = c.benchmark_group("sampling/table");
     group.throughput(Throughput::Elements(u64::from(COUNT)));
     group.bench_function("lights", |b| {
-        b.iter(|| black_box(&points).iter().map(|u| lights.sample(u.x).0).sum::<usize>());
+        b.iter(|| {
+            black_box(&points).iter().map(|u| lights.sample(f64::from(u.x)).0).sum::<usize>()
+        });
     });
     group.bench_function("sky", |b| {
         b.iter(|| black_box(&points).iter().map(|&u| sky.sample(u).1).sum::<f32>());

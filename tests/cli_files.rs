@@ -131,6 +131,31 @@ fn only_what_is_missing_or_damaged_is_rendered_again() {
 }
 
 #[test]
+fn warnings_are_told_once_and_not_for_every_frame() {
+    let folder = folder();
+    let suspicious = SCENE
+        .replace(
+            "entities:",
+            r#"materials: { "spare": Mirror(), "glass": Dielectric() }, entities:"#,
+        )
+        .replace("emission: Radiance((0.5, 0.25, 0.125))", r#"material: "glass""#)
+        .replace(r#""ball""#, r#""spot": (light: Point(power: (1, 1, 1))), "ball""#);
+    fs::write(folder.path().join("b.ron"), suspicious).expect("writable");
+    let small = ["render", "b.ron", "--size", "8x8", "--samples", "1", "--frames", "0-3"];
+    let output = kinora(folder.path(), &small);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let told = stderr(&output);
+    assert_eq!(told.matches("nothing uses the material `spare`").count(), 1, "{told}");
+    assert_eq!(told.matches("out of reach").count(), 1, "{told}");
+    assert!(!told.contains("warning: warning"), "{told}");
+    let check = kinora(folder.path(), &["check", "b.ron"]);
+    let text = String::from_utf8_lossy(&check.stdout).into_owned();
+    for part in ["requires", "caustics:", "integrator", "nothing uses", "out of reach"] {
+        assert!(text.contains(part), "no {part:?} in: {text}");
+    }
+}
+
+#[test]
 fn the_files_do_not_depend_on_the_number_of_threads() {
     let folder = folder();
     for threads in ["1", "2", "5"] {

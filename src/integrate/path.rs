@@ -240,7 +240,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
         counters: &mut PathCounters,
     ) -> (Vec3, f64, Rgb) {
         const NONE: (Vec3, f64, Rgb) = (Vec3::ZERO, 0.0, Rgb::ZERO);
-        let choose = sampler.one(dimensions + dimension::LIGHT);
+        let choose = sampler.one_fine(dimensions + dimension::LIGHT);
         let on_light = sampler.two(dimensions + dimension::LIGHT_POINT);
         let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
             return NONE;
@@ -361,7 +361,8 @@ impl<'a> Vertex<'a> {
     fn receiver(&self) -> Receiver {
         let SurfacePoint { p, p_error, ng, ns, .. } = self.surface;
         let facing = if self.wo.dot(ns) < 0.0 { -ns } else { ns };
-        Receiver { p, p_error, ng, facing }
+        let horizon = (!self.bsdf.transmits()).then_some(facing);
+        Receiver { p, p_error, ng, facing, horizon }
     }
 
     /// Whether `wi` leaves by the side on which the BSDF placed it.

@@ -112,6 +112,15 @@ impl MotionTransform {
         matches!(self, Self::Static { .. })
     }
 
+    /// Where the origin goes at the keys.
+    pub fn keys_translations(&self) -> impl Iterator<Item = DVec3> {
+        let (rest, keys): (_, &[Decomposed]) = match self {
+            Self::Static { forward, .. } => (Some(forward.translation), &[]),
+            Self::Moving { keys } => (None, keys),
+        };
+        rest.into_iter().chain(keys.iter().map(|key| key.translation))
+    }
+
     /// World from object at time `u` in `[0, 1]` of the shutter.
     pub fn at(&self, u: f32) -> DAffine3 {
         match self {

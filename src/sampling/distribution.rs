@@ -66,8 +66,7 @@ impl Piecewise1D {
     /// The cell which `u` in `[0, 1)` falls into, and where in the cell, in `[0, 1)`.
     ///
     /// A cell of probability 0 is never returned.
-    pub fn sample(&self, u: f32) -> (usize, f32) {
-        let u = f64::from(u);
+    pub fn sample(&self, u: f64) -> (usize, f32) {
         // The last k with cumulative[k] <= u; cells of width 0 are skipped by taking the last.
         let mut k = self.cumulative.partition_point(|&c| c <= u) - 1;
         if k >= self.len() {
@@ -103,8 +102,8 @@ impl Piecewise2D {
 
     /// A point of the unit square and its density per unit area of the square.
     pub fn sample(&self, u: Vec2) -> (Vec2, f32) {
-        let (row, v) = self.rows.sample(u.y);
-        let (column, w) = self.columns[row].sample(u.x);
+        let (row, v) = self.rows.sample(f64::from(u.y));
+        let (column, w) = self.columns[row].sample(f64::from(u.x));
         let (width, height) = (self.columns[0].len() as f32, self.rows.len() as f32);
         let p = Vec2::new((column as f32 + w) / width, (row as f32 + v) / height);
         (p.min(Vec2::splat(1.0_f32.next_down())), self.cell_pdf(column, row))
@@ -134,12 +133,12 @@ mod tests {
         let d = Piecewise1D::new([0.0, 3.0, 0.0, 1.0, 0.0]);
         let mut counts = [0; 5];
         for k in 0..4000 {
-            let (cell, within) = d.sample(k as f32 / 4000.0);
+            let (cell, within) = d.sample(f64::from(k) / 4000.0);
             assert!((0.0..1.0).contains(&within));
             counts[cell] += 1;
         }
         assert_eq!(counts, [0, 3000, 0, 1000, 0]);
-        assert_eq!(d.sample(1.0_f32.next_down()).0, 3);
+        assert_eq!(d.sample(1.0_f64.next_down()).0, 3);
         assert_eq!(d.probability(1), 0.75);
     }
 

@@ -62,9 +62,14 @@ impl Sampler {
     /// A number in `[0, 1)` for the given dimension.
     #[inline]
     pub fn one(&self, dimension: u32) -> f32 {
-        let key = self.key(dimension);
-        let index = owen_reversed(self.reversed_index, key as u32).reverse_bits();
-        unit(owen_reversed(index, (key >> 32) as u32).reverse_bits())
+        unit(self.bits(dimension))
+    }
+
+    /// A number in `[0, 1)` for the given dimension with all its 32 bits: for a choice among more
+    /// things than an `f32` can tell apart.
+    #[inline]
+    pub fn one_fine(&self, dimension: u32) -> f64 {
+        f64::from(self.bits(dimension)) / 4_294_967_296.0
     }
 
     /// Two numbers in `[0, 1)`, stratified together, for the given dimension and the next.
@@ -76,6 +81,12 @@ impl Sampler {
         let x = owen_reversed(index, (key >> 32) as u32).reverse_bits();
         let y = owen_reversed(pascal(index), second_key as u32).reverse_bits();
         Vec2::new(unit(x), unit(y))
+    }
+
+    fn bits(&self, dimension: u32) -> u32 {
+        let key = self.key(dimension);
+        let index = owen_reversed(self.reversed_index, key as u32).reverse_bits();
+        owen_reversed(index, (key >> 32) as u32).reverse_bits()
     }
 
     fn key(&self, dimension: u32) -> u64 {

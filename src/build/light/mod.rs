@@ -1,8 +1,10 @@
 //! Lights: which there are, choosing one, and drawing a direction towards it.
 
+mod choice;
 mod sky;
 mod table;
 mod towards;
+mod tree;
 
 pub use sky::SkyLight;
 pub use table::{Emitted, Emitter, LightTable, rebuild_light_table};

@@ -1,19 +1,20 @@
-//! The lights of a frame, and the probability with which each is chosen: in proportion to its
-//! power.
+//! The lights of a frame, with what their choice depends on.
 
 use super::SkyLight;
-use crate::build::bvh::MeshTrees;
+use super::choice::LightChoice;
+use super::tree::{Cone, LightBounds};
+use crate::build::bvh::{MeshTree, MeshTrees};
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
     Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, SurfaceEmission,
     Surfaces,
 };
-use crate::sampling::Piecewise1D;
+use crate::math::Aabb;
 use crate::shade::{MaterialTable, texture};
-use crate::shape::{AreaFactor, triangle_area};
+use crate::shape::{Primitive, triangle_area};
 use bevy_ecs::prelude::*;
-use glam::Vec3;
+use glam::{DAffine3, DVec3};
 use std::f64::consts::{PI, TAU};
 
 /// Something that can be chosen as the light of a sample.
@@ -47,8 +48,8 @@ pub struct Emitted {
 #[derive(Resource, Clone, Debug, Default)]
 pub struct LightTable {
     pub(super) emitters: Vec<Emitter>,
-    /// Probability of each emitter; `None` when there is none to choose.
-    pub(super) choice: Option<Piecewise1D>,
+    /// How one of them is chosen.
+    pub(super) choice: LightChoice,
     /// First emitter of each instance, or [`NOTHING`].
     pub(super) first_of_instance: Vec<u32>,
     /// Emitter of each light without a shape.
@@ -71,11 +72,6 @@ impl LightTable {
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty()
     }
-
-    /// The probability with which an emitter is chosen.
-    pub(super) fn probability(&self, emitter: u32) -> f32 {
-        self.choice.as_ref().map_or(0.0, |choice| choice.probability(emitter as usize) as f32)
-    }
 }
 
 /// Builds [`LightTable`] anew when objects, surfaces or lights changed.
@@ -93,31 +89,29 @@ pub fn rebuild_light_table(
         }
         return;
     }
-    let mut builder =
-        Builder { table: LightTable::default(), weights: Vec::new(), distant: Vec::new() };
+    let mut builder = Builder::default();
     for (index, instance) in (0..).zip(&instances.list) {
         builder.add_instance(index, instance, &surfaces, &meshes);
     }
-    for (index, light) in (0..).zip(&punctual.0) {
-        builder.add_punctual(index, light, &surfaces.materials);
-    }
+    builder.add_punctual(&punctual.0, &surfaces.materials);
     *table = builder.finish();
 }
 
+#[derive(Default)]
 struct Builder {
     table: LightTable,
-    /// Flux of each emitter; of distant ones what they send through one square metre.
-    weights: Vec<f64>,
-    /// Emitters infinitely far away.
-    distant: Vec<u32>,
+    near: Vec<LightBounds>,
+    far: Vec<f64>,
 }
 
 impl Builder {
-    fn add(&mut self, emitter: Emitter, weight: f64) -> u32 {
-        let index = self.weights.len() as u32;
+    /// Adds a light which has a place; all of these come before those which have none.
+    fn add_near(&mut self, emitter: Emitter, light: LightBounds) -> u32 {
+        let index = self.near.len() as u32;
         self.table.emitters.push(emitter);
-        // A weight beyond the range of f64 would make every other probability 0.
-        self.weights.push(if weight.is_finite() { weight } else { 0.0 });
+        // A flux beyond the range of f64 would make every other probability 0.
+        let flux = if light.flux.is_finite() { light.flux } else { 0.0 };
+        self.near.push(LightBounds { flux, ..light });
         index
     }
 
@@ -135,41 +129,42 @@ impl Builder {
             return;
         };
         let map = instance.motion.at(0.0);
-        let triangle_areas: Option<Vec<f64>> = match instance.geometry {
+        let triangles = match instance.geometry {
             Geometry::Primitive(_) => None,
-            Geometry::Mesh(mesh) => {
-                let tree = &meshes.list[mesh as usize];
-                let factor = AreaFactor::new(&map.matrix3);
-                let area = |triangle: u32| {
-                    let [a, b, c] = tree.corners(triangle).map(Vec3::as_dvec3);
-                    let normal = (b - a).cross(c - a);
-                    if normal.length_squared() > 0.0 {
-                        triangle_area([a, b, c]) * factor.at(normal)
-                    } else {
-                        0.0
-                    }
-                };
-                Some((0..tree.mesh.triangles.len() as u32).map(area).collect())
-            }
+            Geometry::Mesh(mesh) => Some(triangles(&meshes.list[mesh as usize], &map)),
         };
-        let area = match (&triangle_areas, instance.geometry) {
+        let area = match (&triangles, instance.geometry) {
             (None, Geometry::Primitive(primitive)) => primitive.world_area(&map),
-            (areas, _) => areas.iter().flatten().sum(),
+            (triangles, _) => triangles.iter().flatten().map(|triangle| triangle.area).sum(),
         };
         let emitted = emitted(emission, area);
         let mean = f64::from(luminance(mean_color(&emitted.radiance, &surfaces.materials)))
             * f64::from(emitted.factor);
-        let sides = if emitted.two_sided { 2.0 } else { 1.0 };
-        let flux_per_area = mean * PI * sides;
+        let two_sided = emitted.two_sided;
+        let flux_per_area = mean * PI * if two_sided { 2.0 } else { 1.0 };
         self.table.emitted.push(Some(emitted));
-        let first = match triangle_areas {
+        let whole = LightBounds {
+            bounds: instance.bounds,
+            flux: flux_per_area * area,
+            cone: facing(instance, &map),
+            two_sided,
+        };
+        let first = match triangles {
             // An infinite plane cannot be drawn from; it is found by chance alone.
             None if area.is_infinite() => NOTHING,
-            None => self.add(Emitter::Shape(index), flux_per_area * area),
-            Some(areas) => {
-                let first = self.weights.len() as u32;
-                for (triangle, area) in (0..).zip(areas) {
-                    self.add(Emitter::Triangle { instance: index, triangle }, flux_per_area * area);
+            None => self.add_near(Emitter::Shape(index), whole),
+            Some(triangles) => {
+                let first = self.near.len() as u32;
+                for (k, triangle) in (0..).zip(triangles) {
+                    let flux = flux_per_area * triangle.area;
+                    // What moves is somewhere in the bounds of the whole, facing anywhere.
+                    let light = if instance.motion.is_static() && triangle.area > 0.0 {
+                        let cone = Cone::facing(triangle.normal);
+                        LightBounds { bounds: triangle.bounds, flux, cone, two_sided }
+                    } else {
+                        LightBounds { flux, cone: Cone::everywhere(), ..whole }
+                    };
+                    self.add_near(Emitter::Triangle { instance: index, triangle: k }, light);
                 }
                 first
             }
@@ -177,52 +172,88 @@ impl Builder {
         self.table.first_of_instance.push(first);
     }
 
-    fn add_punctual(&mut self, index: u32, light: &PunctualLight, materials: &MaterialTable) {
-        let mut sky = None;
-        let mut is_distant = false;
-        let weight = match light.light {
-            Light::Point { intensity, power } => {
-                f64::from(luminance(PunctualLight::point_intensity(intensity, power))) * 4.0 * PI
-            }
-            Light::Spot { intensity, angle, .. } => {
-                f64::from(luminance(intensity)) * TAU * (1.0 - f64::from(angle).to_radians().cos())
-            }
-            Light::Directional { irradiance, .. } => {
-                is_distant = true;
-                f64::from(luminance(irradiance))
-            }
-            Light::Sky { radiance, scale } => {
-                let light = SkyLight::new(radiance, scale, materials);
-                let per_area = light.mean_radiance() * 4.0 * PI;
-                (sky, is_distant) = (Some(light), true);
-                per_area
-            }
-        };
-        let emitter = self.add(Emitter::Punctual(index), weight);
-        if is_distant {
-            self.distant.push(emitter);
+    fn add_punctual(&mut self, lights: &[PunctualLight], materials: &MaterialTable) {
+        self.table.of_punctual = vec![NOTHING; lights.len()];
+        self.table.skies = vec![None; lights.len()];
+        for (index, light) in (0..).zip(lights) {
+            let (flux, cone) = match light.light {
+                Light::Point { intensity, power } => {
+                    let intensity = luminance(PunctualLight::point_intensity(intensity, power));
+                    (f64::from(intensity) * 4.0 * PI, Cone::everywhere())
+                }
+                Light::Spot { intensity, angle, .. } => {
+                    let angle = f64::from(angle).to_radians();
+                    let axis = -light.motion.at(0.0).matrix3.z_axis.normalize();
+                    let cone = if light.motion.is_static() {
+                        Cone { axis, theta_o: angle, theta_e: 0.0 }
+                    } else {
+                        Cone::everywhere()
+                    };
+                    (f64::from(luminance(intensity)) * TAU * (1.0 - angle.cos()), cone)
+                }
+                Light::Directional { .. } | Light::Sky { .. } => continue,
+            };
+            let keys = light.motion.keys_translations();
+            let bounds = Aabb::from_points(keys.map(DVec3::as_vec3));
+            let light = LightBounds { bounds, flux, cone, two_sided: false };
+            self.table.of_punctual[index as usize] = self.add_near(Emitter::Punctual(index), light);
         }
-        self.table.of_punctual.push(emitter);
-        self.table.skies.push(sky);
+        for (index, light) in (0..).zip(lights) {
+            let power = match light.light {
+                Light::Directional { irradiance, .. } => f64::from(luminance(irradiance)),
+                Light::Sky { radiance, scale } => {
+                    let sky = SkyLight::new(radiance, scale, materials);
+                    let through = sky.mean_radiance() * 4.0 * PI;
+                    self.table.skies[index as usize] = Some(sky);
+                    through
+                }
+                Light::Point { .. } | Light::Spot { .. } => continue,
+            };
+            self.table.of_punctual[index as usize] = self.table.emitters.len() as u32;
+            self.table.emitters.push(Emitter::Punctual(index));
+            self.far.push(if power.is_finite() { power } else { 0.0 });
+        }
     }
 
-    /// What is infinitely far away has no flux that could be compared with that of lamps: how much of it
-    /// enters the scene grows with the scene, and one huge object would starve all lamps. Both kinds
-    /// share the choices evenly, and within each kind the choice follows the power.
-    fn finish(mut self) -> LightTable {
-        let (mut near, mut far) = (0.0, 0.0);
-        for (k, weight) in (0..).zip(&self.weights) {
-            let sum = if self.distant.contains(&k) { &mut far } else { &mut near };
-            *sum += weight;
-        }
-        let balance: f64 = near / far;
-        if balance.is_normal() && balance > 0.0 {
-            for &k in &self.distant {
-                self.weights[k as usize] *= balance;
-            }
-        }
-        let choice = (!self.weights.is_empty()).then(|| Piecewise1D::new(self.weights));
+    fn finish(self) -> LightTable {
+        let choice = LightChoice::new(&self.near, &self.far);
         LightTable { choice, built: true, ..self.table }
+    }
+}
+
+/// A triangle of an emitting mesh in render space.
+struct Triangle {
+    area: f64,
+    normal: DVec3,
+    bounds: Aabb,
+}
+
+fn triangles(tree: &MeshTree, map: &DAffine3) -> Vec<Triangle> {
+    let count = tree.mesh.triangles.len() as u32;
+    let triangle = |triangle: u32| {
+        let corners = tree.corners(triangle);
+        let [a, b, c] = corners.map(|corner| map.transform_point3(corner.as_dvec3()));
+        // The side that is outside stays outside under a mirroring map.
+        let normal = (b - a).cross(c - a) * map.matrix3.determinant().signum();
+        Triangle {
+            area: triangle_area([a, b, c]),
+            normal: normal.normalize_or(DVec3::Z),
+            bounds: Aabb::from_points([a, b, c].map(DVec3::as_vec3)),
+        }
+    };
+    (0..count).map(triangle).collect()
+}
+
+/// Where the surface of an analytic shape faces.
+fn facing(instance: &Instance, map: &DAffine3) -> Cone {
+    match instance.geometry {
+        Geometry::Primitive(Primitive::Rectangle | Primitive::Disk)
+            if instance.motion.is_static() =>
+        {
+            let normal = map.matrix3.inverse().transpose() * DVec3::Z;
+            Cone::facing(normal.normalize())
+        }
+        _ => Cone::everywhere(),
     }
 }
 

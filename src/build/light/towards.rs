@@ -29,6 +29,8 @@ pub struct Receiver {
     pub ng: Vec3,
     /// Unit shading normal on the side from which the path arrives.
     pub facing: Vec3,
+    /// The same normal if light from behind it cannot matter; `None` where the surface transmits.
+    pub horizon: Option<Vec3>,
 }
 
 /// Where a shadow ray ends.
@@ -143,10 +145,10 @@ fn is_similarity(map: &DAffine3) -> bool {
 
 impl Lights<'_> {
     /// Draws a light and a direction towards it. `None` when the draw carries no light.
-    pub fn sample(&self, from: &Receiver, time: f32, choose: f32, u: Vec2) -> Option<LightSample> {
-        let (index, _) = self.table.choice.as_ref()?.sample(choose);
-        let probability = self.table.probability(index as u32);
-        let mut sample = match self.table.emitters[index] {
+    pub fn sample(&self, from: &Receiver, time: f32, choose: f64, u: Vec2) -> Option<LightSample> {
+        let (index, probability) =
+            self.table.choice.sample(from.p.as_vec3(), from.horizon, choose)?;
+        let mut sample = match self.table.emitters[index as usize] {
             Emitter::Shape(instance) => self.sample_shape(instance, from, time, u),
             Emitter::Triangle { instance, triangle } => {
                 self.sample_mesh(instance, triangle, from, time, u)
@@ -204,7 +206,7 @@ impl Lights<'_> {
                 triangle_pdf(from.p, self.triangle(instance, primitive, &map), q),
             ),
         };
-        self.table.probability(emitter) * pdf as f32
+        self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon) * pdf as f32
     }
 
     /// Radiance from the lights infinitely far away in the unit direction `wi`, each with the density
@@ -217,7 +219,10 @@ impl Lights<'_> {
     ) -> impl Iterator<Item = (Rgb, f32)> {
         (0..self.punctual.len()).filter_map(move |index| {
             let light = &self.punctual[index];
-            let probability = self.table.probability(self.table.of_punctual[index]);
+            let probability = from.map_or(0.0, |from| {
+                let emitter = self.table.of_punctual[index];
+                self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon)
+            });
             if let Some(sky) = &self.table.skies[index] {
                 let map = light.motion.at(time);
                 let pdf = from.map_or(0.0, |from| sky.pdf(from.facing, wi, &map));

@@ -219,6 +219,16 @@ impl Bsdf<'_> {
         }
     }
 
+    /// Whether light from the other side can come through.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::SmoothDielectric(_) | Self::RoughDielectric(_) | Self::ThinGlass(_) => true,
+            Self::Principled(bsdf) => bsdf.transmits(),
+            _ => false,
+        }
+    }
+
     /// Share of the light from `wo` which is scattered at all, transmission included: for
     /// the albedo layer. Exact up to the interpolation of tables.
     pub fn albedo(&self, wo: Vec3) -> Rgb {

@@ -81,6 +81,11 @@ impl<'t> Principled<'t> {
         }
     }
 
+    /// Whether light from the other side can come through.
+    pub fn transmits(&self) -> bool {
+        self.transmitted != Rgb::ZERO
+    }
+
     /// Whether it has any lobe which is not a delta.
     pub(super) fn has_non_delta(&self) -> bool {
         self.lobe.is_some() || self.diffuse != Rgb::ZERO
