@@ -440,7 +440,7 @@ mod tests {
             cone: Cone::everywhere(),
             two_sided: false,
         };
-        let tree = LightTree::new(&[one; 1000]);
+        let tree = LightTree::new(&vec![one; 1000]);
         for l in [0, 500, 999] {
             assert!((tree.probability(l, Vec3::ZERO, None) - 1e-3).abs() < 1e-6);
         }
