@@ -91,6 +91,9 @@ pub enum RenderError {
     /// A component refers to an entity which is not what it should be.
     #[error("{0}")]
     Dangling(String),
+    /// Systems which touch the same data have no order.
+    #[error("the systems of the frame cannot be put in order: {0}")]
+    Systems(String),
     /// The picture cannot be made.
     #[error(transparent)]
     Film(#[from] FilmError),
@@ -215,6 +218,7 @@ impl Simulation {
         self.world.insert_resource(control.clone());
         self.world.resource_mut::<FrameClock>().frame = frame;
         self.world.resource_mut::<StageClock>().0.clear();
+        self.check_systems()?;
         self.schedule.run(&mut self.world);
         self.world.clear_trackers();
         if let Some(first) = self.dangling() {
@@ -247,6 +251,17 @@ impl Simulation {
         let instances = || self.world.resource::<Instances>().dangling.first();
         let camera = || self.world.resource::<ViewCamera>().dangling.as_ref();
         surfaces.or_else(instances).or_else(camera).cloned()
+    }
+
+    /// Builds the schedules, which fails when systems conflict without an order between them.
+    fn check_systems(&mut self) -> Result<(), RenderError> {
+        let conflict = |schedule: &mut Schedule, world: &mut World| match schedule.initialize(world)
+        {
+            Ok(_) => Ok(()),
+            Err(error) => Err(RenderError::Systems(error.to_string(schedule.graph(), world))),
+        };
+        self.world.schedule_scope(step::Pose, |world, poses| conflict(poses, world))?;
+        conflict(&mut self.schedule, &mut self.world)
     }
 
     fn check_clock(&self) -> Result<(), RenderError> {
@@ -312,6 +327,15 @@ impl Simulation {
     }
 }
 
+/// Whether every reference between entities leads to what it should.
+fn nothing_dangles(
+    surfaces: Res<Surfaces>,
+    instances: Res<Instances>,
+    camera: Res<ViewCamera>,
+) -> bool {
+    surfaces.dangling.is_empty() && instances.dangling.is_empty() && camera.dangling.is_none()
+}
+
 /// Builds the frame schedule; every stage installs its own systems and resources.
 fn frame_schedule(world: &mut World) -> Schedule {
     use FrameSystems::{Build, Extract, Integrate, Step};
@@ -322,6 +346,7 @@ fn frame_schedule(world: &mut World) -> Schedule {
     frame.configure_sets((Marks::Opening, Step, Marks::Stepped, Extract).chain());
     frame.configure_sets((Extract, Marks::Extracted, Build, Marks::Built).chain());
     frame.configure_sets((Marks::Built, Integrate, Marks::Integrated).chain());
+    frame.configure_sets((Build.run_if(nothing_dangles), Integrate.run_if(nothing_dangles)));
     for set in [Marks::Opening, Marks::Stepped, Marks::Extracted, Marks::Built, Marks::Integrated] {
         frame.add_systems(mark.in_set(set));
     }
@@ -352,5 +377,23 @@ mod tests {
         let mut simulation = Simulation::new();
         simulation.schedule.add_systems(meddle);
         assert!(simulation.schedule.initialize(&mut simulation.world).is_err());
+    }
+
+    /// Two systems of a program which move the same things without an order are an error which names
+    /// them.
+    #[test]
+    fn unordered_step_systems_are_an_error() {
+        fn push(mut all: Query<&mut crate::world::Transform>) {
+            all.iter_mut().for_each(|mut t| t.translation.x += 1.0);
+        }
+        fn pull(mut all: Query<&mut crate::world::Transform>) {
+            all.iter_mut().for_each(|mut t| t.translation.x -= 1.0);
+        }
+        let mut simulation = Simulation::new();
+        simulation.add_step_systems((push, pull));
+        simulation.world.spawn(Camera::default());
+        let error = simulation.render_frame(0, &RenderControl::default());
+        let error = error.expect_err("a conflict").to_string();
+        assert!(error.contains("push") && error.contains("pull"), "{error}");
     }
 }

@@ -152,7 +152,11 @@ fn an_empty_world_with_a_camera_is_black() {
 #[test]
 fn dangling_references_are_errors() {
     type Spoil = fn(&mut World, Entity, Entity);
-    let spoilers: [(&str, Spoil); 6] = [
+    let spoilers: [(&str, Spoil); 7] = [
+        ("a mixture of itself", |world, object, _| {
+            let amount = Value::Constant(0.5);
+            world.entity_mut(object).insert(Material::Mix { a: object, b: object, amount });
+        }),
         ("a texture", |world, object, gone| {
             world.entity_mut(object).insert(Material::Diffuse { albedo: Value::Texture(gone) });
         }),

@@ -2,7 +2,7 @@
 
 use super::spawn_order;
 use crate::description::{EmissionStrength, Rgb, Value};
-use crate::shade::MaterialTable;
+use crate::shade::{MaterialTable, material_cycle};
 use crate::world::{Emission, EmissionFactor, Material, Texture};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
@@ -63,6 +63,10 @@ pub struct SurfaceEmission {
     pub two_sided: bool,
 }
 
+/// Stands in for a material which cannot be; the frame is not rendered then.
+const BLACK: crate::description::Material<u32> =
+    crate::description::Material::Mirror { reflectance: Value::Constant(Rgb::ZERO) };
+
 /// Whether a material reads a texture, or refers to another material, which may.
 fn is_textured(material: &crate::description::Material<u32>) -> bool {
     material.clone().map_refs::<(), ()>(&mut |_| Err(()), &mut |_| Err(())).is_err()
@@ -117,13 +121,19 @@ pub fn extract_surfaces(
             let indexed = material.clone().map_refs(&mut { texture_of }, &mut { material_of });
             let indexed = indexed.unwrap_or_else(|what| {
                 dangling.push(format!("the material of {entity} refers to {what}"));
-                crate::description::Material::Mirror { reflectance: Value::Constant(Rgb::ZERO) }
+                BLACK
             });
             (material_slots[&entity], indexed)
         })
         .collect();
     table.sort_unstable_by_key(|(slot, _)| *slot);
-    let table: Vec<_> = table.into_iter().map(|(_, material)| material).collect();
+    let mut table: Vec<_> = table.into_iter().map(|(_, material)| material).collect();
+    while let Some(looped) = material_cycle(&table) {
+        let entity = materials.iter().map(|(e, _)| e).find(|e| material_slots[e] == looped);
+        let name = entity.map_or_else(String::new, |e| format!(" of {e}"));
+        dangling.push(format!("the material{name} is mixed of itself"));
+        table[looped as usize] = BLACK;
+    }
     let mut images: Vec<(u32, Texture)> = textures
         .iter()
         .map(|(entity, texture)| (texture_slots[&entity], texture.clone()))
