@@ -4,7 +4,7 @@
 
 mod common;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use kinora::frame::{RenderControl, Simulation};
 
 const SIZE: (u32, u32) = (64, 64);
@@ -26,5 +26,20 @@ fn path(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, path);
+/// One room, one power, ever more lamps: what choosing among them costs.
+fn many_lights(c: &mut Criterion) {
+    let mut group = c.benchmark_group("integrate/lights");
+    group.throughput(Throughput::Elements(u64::from(SIZE.0 * SIZE.1 * SAMPLES)));
+    group.sample_size(20);
+    for count in [1, 100, 10_000] {
+        let mut simulation = common::hall(count, SIZE, SAMPLES);
+        let control = RenderControl::default();
+        group.bench_function(BenchmarkId::from_parameter(count), |b| {
+            b.iter(|| simulation.render_frame(0, &control).expect("the world is valid"));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, path, many_lights);
 criterion_main!(benches);

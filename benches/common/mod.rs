@@ -114,3 +114,34 @@ pub fn world_of_instances(mesh: &Arc<TriangleMesh>, points: &[Vec3], size: f64) 
     }
     simulation
 }
+
+/// A hall with a floor, sixty boxes and `count` small lamps of equal power under its ceiling.
+pub fn hall(count: usize, size: (u32, u32), samples: u32) -> Simulation {
+    use kinora::description::{EmissionStrength, RenderSettings};
+    use kinora::world::{Emission, Settings};
+    let mut uniforms = Uniforms::new(19);
+    let mut simulation = Simulation::new();
+    let world = simulation.world_mut();
+    world.insert_resource(Settings(RenderSettings { size, samples, ..Default::default() }));
+    let eye = Transform { translation: DVec3::new(0.0, 1.7, 18.0), ..Default::default() };
+    world.spawn((Camera { fov: 50.0, ..Default::default() }, eye));
+    world.spawn(Shape::Plane {});
+    for _ in 0..60 {
+        let p = uniforms.cube().as_dvec3() * 15.0;
+        let place = Transform { translation: DVec3::new(p.x, 0.5, p.z), ..Default::default() };
+        world.spawn((Shape::Box { size: DVec3::ONE }, place));
+    }
+    let columns = (count as f64).sqrt().ceil() as usize;
+    let place = |k: usize| ((k as f64 + 0.5) / columns as f64 - 0.5) * 40.0;
+    for k in 0..count {
+        let lamp = Transform {
+            translation: DVec3::new(place(k % columns), 3.9, place(k / columns)),
+            rotation: glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2),
+            ..Default::default()
+        };
+        let watts = Vec3::splat(2000.0 / count as f32);
+        let emission = Emission { strength: EmissionStrength::Power(watts), two_sided: false };
+        world.spawn((Shape::Rectangle { size: glam::DVec2::splat(0.05) }, emission, lamp));
+    }
+    simulation
+}
