@@ -46,54 +46,94 @@ pub fn sample_shutter(world: &mut World) {
     } else {
         0
     };
-    let motions = loop {
-        let samples = sample_poses(world, open, close, grid);
-        let mut satisfied = true;
-        let motions: Vec<(Entity, ShutterMotion)> = samples
-            .into_iter()
-            .map(|(entity, poses)| {
-                let least = least.get(&entity).copied().unwrap_or(1);
-                let (keys, enough) = fewest_keys(&poses, least, tolerance);
-                satisfied &= enough;
-                (entity, ShutterMotion { keys })
-            })
-            .collect();
-        if satisfied || grid >= FINEST_GRID {
-            break motions;
+    let samples = loop {
+        let samples = Samples::take(world, open, close, grid);
+        if grid >= FINEST_GRID || samples.satisfy(&least, tolerance) {
+            break samples;
         }
         grid *= 2;
     };
-    for (entity, motion) in motions {
-        if let Some(mut old) = world.get_mut::<ShutterMotion>(entity) {
-            old.set_if_neq(motion);
+    for index in 0..samples.entities.len() {
+        let entity = samples.entities[index];
+        let Some(mut motion) = world.get_mut::<ShutterMotion>(entity) else { continue };
+        let least = least.get(&entity).copied().unwrap_or(1);
+        if least <= 1 && samples.rests(index) {
+            // What rests is the common case: it is compared without making a list of keys.
+            let here = samples.poses[0][index];
+            if motion.keys.as_slice() != [here] {
+                motion.keys = vec![here];
+            }
+        } else {
+            let (keys, _) = fewest_keys(&samples.of(index), least, tolerance);
+            motion.set_if_neq(ShutterMotion { keys });
         }
     }
     sample_optics(world, open, close);
     sample_emission(world, open, close);
 }
 
-/// The poses of every entity at `grid + 1` times, or at the opening alone when `grid` is 0.
-fn sample_poses(
-    world: &mut World,
-    open: f64,
-    close: f64,
-    grid: usize,
-) -> EntityHashMap<Vec<DAffine3>> {
-    let mut samples: EntityHashMap<Vec<DAffine3>> = EntityHashMap::default();
-    let mut poses = world.query::<(Entity, &WorldTransform)>();
-    // Backwards, so that the world is left at the opening.
-    for k in (0..=grid).rev() {
-        let share = if grid == 0 { 0.0 } else { k as f64 / grid as f64 };
-        world.resource_mut::<SceneTime>().seconds = open + (close - open) * share;
-        world.run_schedule(super::Pose);
-        for (entity, pose) in poses.iter(world) {
-            samples.entry(entity).or_default().push(pose.0);
+/// The poses of all entities at evenly spaced times.
+struct Samples {
+    /// The entities, in the order of the world.
+    entities: Vec<Entity>,
+    /// For each time the pose of each entity.
+    poses: Vec<Vec<DAffine3>>,
+}
+
+impl Samples {
+    /// Asks the pose systems at `grid + 1` times from `open` to `close`, or at the opening alone when
+    /// `grid` is 0. An entity which is not there at every time is left out.
+    fn take(world: &mut World, open: f64, close: f64, grid: usize) -> Self {
+        let mut query = world.query::<(Entity, &WorldTransform)>();
+        let mut entities: Vec<Entity> = Vec::new();
+        let mut poses = Vec::with_capacity(grid + 1);
+        // Backwards, so that the world is left at the opening.
+        for k in (0..=grid).rev() {
+            let share = if grid == 0 { 0.0 } else { k as f64 / grid as f64 };
+            world.resource_mut::<SceneTime>().seconds = open + (close - open) * share;
+            world.run_schedule(super::Pose);
+            if entities.is_empty() {
+                entities = query.iter(world).map(|(entity, _)| entity).collect();
+            }
+            let now: Vec<DAffine3> = query.iter(world).map(|(_, pose)| pose.0).collect();
+            let same = now.len() == entities.len()
+                && query.iter(world).zip(&entities).all(|((entity, _), old)| entity == *old);
+            if same {
+                poses.push(now);
+            } else {
+                let there: EntityHashMap<DAffine3> =
+                    query.iter(world).map(|(entity, pose)| (entity, pose.0)).collect();
+                let stays: Vec<bool> = entities.iter().map(|e| there.contains_key(e)).collect();
+                let mut keep = |list: &mut Vec<DAffine3>| {
+                    let mut stays = stays.iter();
+                    list.retain(|_| *stays.next().expect("one for each entity"));
+                };
+                poses.iter_mut().for_each(&mut keep);
+                entities.retain(|entity| there.contains_key(entity));
+                poses.push(entities.iter().map(|entity| there[entity]).collect());
+            }
         }
-    }
-    for poses in samples.values_mut() {
         poses.reverse();
+        Self { entities, poses }
     }
-    samples
+
+    /// The poses of one entity over time.
+    fn of(&self, index: usize) -> Vec<DAffine3> {
+        self.poses.iter().map(|poses| poses[index]).collect()
+    }
+
+    /// Whether an entity has the same pose at all times.
+    fn rests(&self, index: usize) -> bool {
+        self.poses[1..].iter().all(|poses| poses[index] == self.poses[0][index])
+    }
+
+    /// Whether the motion of every entity is known well enough.
+    fn satisfy(&self, least: &EntityHashMap<usize>, tolerance: f64) -> bool {
+        (0..self.entities.len()).all(|index| {
+            let least = least.get(&self.entities[index]).copied().unwrap_or(1);
+            (least <= 1 && self.rests(index)) || fewest_keys(&self.of(index), least, tolerance).1
+        })
+    }
 }
 
 /// The least number of segments for the turns of each entity that turns, its ancestors included.
@@ -131,10 +171,6 @@ fn least_segments(world: &mut World, duration: f64) -> EntityHashMap<usize> {
 /// The poses to keep, and whether they describe the motion within the tolerance.
 fn fewest_keys(poses: &[DAffine3], least: usize, tolerance: f64) -> (Vec<DAffine3>, bool) {
     let grid = poses.len() - 1;
-    let Some(first) = poses.first() else { return (Vec::new(), true) };
-    if least <= 1 && poses.iter().all(|pose| pose == first) {
-        return (vec![*first], true);
-    }
     let allowed = Allowance::of(poses, tolerance);
     let split: Vec<Decomposed> = poses.iter().map(Decomposed::new).collect();
     let mut segments = least.next_power_of_two().min(grid);
