@@ -43,7 +43,7 @@ impl Frame {
 mod tests {
     use super::*;
 
-    /// NUMERICS B23: octants, poles and signed zeros; orthonormal to a few ε.
+    /// Octants, poles and signed zeros: orthonormal to a few ε.
     #[test]
     fn frames_are_orthonormal_everywhere() {
         let mut axes = Vec::new();

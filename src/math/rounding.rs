@@ -62,7 +62,7 @@ pub fn offset_ray_origin(p: DVec3, p_error: DVec3, ng: Vec3, dir: Vec3) -> Vec3 
 mod tests {
     use super::*;
 
-    /// Oracle: NUMERICS N1, γ(3), γ(5), γ(7) of f32 with u = 2⁻²⁴.
+    /// Oracle: γ(3), γ(5), γ(7) of f32 by the definition with u = 2⁻²⁴.
     #[test]
     fn gamma_matches_its_definition() {
         for (n, expected) in [(3, 1.788_14e-7), (5, 2.980_233e-7), (7, 4.172_327e-7)] {
