@@ -10,6 +10,8 @@ use glam::{DAffine3, DVec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Share of references that cutting large triangles may add to the tree of a mesh.
+const SPLIT_BUDGET: f32 = 0.1;
 /// Most instances in a leaf of the top level: a test of one costs a change of space.
 const INSTANCES_PER_LEAF: usize = 1;
 
@@ -24,7 +26,7 @@ pub struct MeshTree {
 impl MeshTree {
     /// Builds the tree of a mesh.
     pub fn build(mesh: Arc<TriangleMesh>) -> Self {
-        let tree = WideTree::build(&mesh);
+        let tree = WideTree::build(&mesh, SPLIT_BUDGET);
         Self { mesh, tree }
     }
 

@@ -22,6 +22,7 @@ use std::arch::x86_64::{
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Avx2(());
 
+#[expect(clippy::unused_self, reason = "the value is the proof")]
 impl Avx2 {
     /// `None` where the processor lacks them. The standard library asks the processor once.
     #[inline]

@@ -41,6 +41,11 @@ impl Reference {
         self.min.w.to_bits()
     }
 
+    #[cfg(test)]
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb { min: self.min.truncate(), max: self.max.truncate() }
+    }
+
     /// Twice the centre of the box.
     #[inline]
     fn center(&self) -> Vec4 {

@@ -88,8 +88,8 @@ impl BoxRay {
         let bounds = Aabb::from_points(corners);
         let planes = [bounds.min, bounds.max];
         let (mut near, mut far) = (0.0, self.distance(t));
-        for axis in 0..3 {
-            let side = self.near_planes[axis] % 2;
+        for (axis, plane) in self.near_planes.into_iter().enumerate() {
+            let side = plane % 2;
             let a = (self.near_origin[axis] - planes[side][axis]) * self.near_inverse[axis];
             near = if a > near { a } else { near };
             let b = (self.far_origin[axis] - planes[side ^ 1][axis]) * self.far_inverse[axis];

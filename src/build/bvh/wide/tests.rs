@@ -1,5 +1,6 @@
 //! What a tree finds is what testing every triangle finds.
 
+use super::binary::Reference;
 use super::meshes::{RawMesh, Uniforms};
 use super::ray::BoxRay;
 use super::*;
@@ -10,6 +11,9 @@ use glam::{DVec2, DVec3, Quat, Vec3};
 fn mesh_of(raw: RawMesh) -> TriangleMesh {
     TriangleMesh { positions: raw.positions, triangles: raw.triangles, ..Default::default() }
 }
+
+/// Budget of the builds: more than usual, so that many triangles are cut.
+const SPLITS: f32 = 0.5;
 
 /// The definition of the closest hit: test all triangles.
 fn nearest_of_all(mesh: &TriangleMesh, ray: &LocalRay, t_max: f64) -> Option<TriangleHit> {
@@ -153,7 +157,7 @@ fn hits_are_those_of_every_triangle() {
         ("room", RawMesh::room(8, 1, 2)),
     ] {
         let mesh = mesh_of(raw);
-        let tree = WideTree::build(&mesh);
+        let tree = WideTree::build(&mesh, SPLITS);
         let hits = compare(what, &mesh, &tree, RAYS, |ray, end| nearest_of_all(&mesh, ray, end));
         total += hits;
         assert!(hits > 0 || what == "a line", "{what}: no ray hits");
@@ -171,10 +175,10 @@ fn hits_are_those_of_a_binary_tree() {
         [("hills", RawMesh::terrain(60, 12, 8)), ("room", RawMesh::room(200, 10, 12))]
     {
         let mesh = mesh_of(raw);
-        let tree = WideTree::build(&mesh);
-        // Enlarged by a unit in the last place, which covers the rounding of the distance of a hit.
+        let tree = WideTree::build(&mesh, SPLITS);
+        // Enlarged, so that the rounding of the distance of a hit cannot hide one of two equal hits.
         let boxes: Vec<Aabb> = (0..mesh.triangles.len() as u32)
-            .map(|k| Aabb::from_points(corners(&mesh, k)).inflated(0.0))
+            .map(|k| Aabb::from_points(corners(&mesh, k)).inflated(1e-6))
             .collect();
         let binary = Bvh::build(&boxes, 4);
         let hits = compare(what, &mesh, &tree, 5 * RAYS, |ray, end| {
@@ -188,7 +192,7 @@ fn hits_are_those_of_a_binary_tree() {
 #[test]
 fn no_ray_leaves_a_closed_surface() {
     let mesh = mesh_of(RawMesh::icosphere(4).map(|p| p * 3.7 + Vec3::new(11.3, -0.7, 5.1)));
-    let tree = WideTree::build(&mesh);
+    let tree = WideTree::build(&mesh, SPLITS);
     let center = DVec3::new(11.3, -0.7, 5.1);
     (0..10 * RAYS).into_par_iter().for_each(|number| {
         let mut u = Uniforms(number);
@@ -215,11 +219,46 @@ fn any_number_of_threads_builds_the_same_tree() {
     let mesh = mesh_of(RawMesh::terrain(100, 20, 8));
     let build = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| WideTree::build(&mesh))
+        pool.install(|| WideTree::build(&mesh, SPLITS))
     };
     let one = build(1);
     assert!(one.nodes.len() > 1000);
     assert!(one == build(2) && one == build(7));
+}
+
+/// Oracle: what was built.
+#[test]
+fn memory_is_as_forecast() {
+    for raw in [RawMesh::terrain(60, 12, 8), RawMesh::room(200, 10, 12), RawMesh::icosphere(5)] {
+        let mesh = mesh_of(raw);
+        for budget in [0.0, 0.1, 0.5] {
+            let held = WideTree::build(&mesh, budget).memory() as f64;
+            let forecast = WideTree::forecast(mesh.triangles.len(), budget) as f64;
+            assert!((held / forecast - 1.0).abs() < 0.2, "{held} for {forecast} at {budget}");
+        }
+    }
+}
+
+/// Oracle: random points of a triangle lie in the box of one of its parts, and the parts are as many
+/// as were paid for.
+#[test]
+fn the_parts_of_a_triangle_cover_it() {
+    let mesh = mesh_of(RawMesh::soup(200, 0.7, 8));
+    let parts = presplit::references(&mesh, 2.0);
+    assert!((500..=600).contains(&parts.len()), "{} parts", parts.len());
+    let mut u = Uniforms(9);
+    for triangle in 0..200 {
+        let [a, b, c] = corners(&mesh, triangle);
+        let own: Vec<Aabb> =
+            parts.iter().filter(|p| p.triangle() == triangle).map(Reference::bounds).collect();
+        for _ in 0..200 {
+            let (s, t) = (u.one(), u.one());
+            let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+            let p = a + (b - a) * s + (c - a) * t;
+            // The point itself is rounded.
+            assert!(own.iter().any(|part| part.inflated(1e-6).contains(p)), "triangle {triangle}");
+        }
+    }
 }
 
 /// Every input gives a tree with every triangle in it and a stack that is long enough.
@@ -238,7 +277,7 @@ fn degenerate_input_makes_bounded_trees() {
     for (raw, left_out) in [(RawMesh::default(), 0), (point, 0), (line, 0), (broken, 2), (huge, 0)]
     {
         let mesh = mesh_of(raw);
-        let tree = WideTree::build(&mesh);
+        let tree = WideTree::build(&mesh, SPLITS);
         assert!(tree.stack <= LONG_STACK);
         let mut found: Vec<u32> = tree
             .blocks
@@ -260,7 +299,7 @@ fn degenerate_input_makes_bounded_trees() {
 #[test]
 fn rays_which_are_not_rays_hit_nothing() {
     let mesh = mesh_of(RawMesh::soup(100, 0.5, 1));
-    let tree = WideTree::build(&mesh);
+    let tree = WideTree::build(&mesh, SPLITS);
     let bad = [DVec3::ZERO, DVec3::NAN, DVec3::INFINITY];
     let rays = bad.map(|d| LocalRay { o: DVec3::splat(0.5), d });
     let more = [DVec3::NAN, DVec3::INFINITY].map(|o| LocalRay { o, d: DVec3::X });
@@ -281,7 +320,7 @@ fn the_first_of_equal_triangles_is_hit() {
         raw.add(&one);
     }
     let mesh = mesh_of(raw);
-    let tree = WideTree::build(&mesh);
+    let tree = WideTree::build(&mesh, SPLITS);
     let center = one.positions.iter().sum::<Vec3>().as_dvec3() / 3.0;
     for d in [DVec3::new(0.3, 0.4, 0.5), DVec3::new(-0.3, -0.4, -0.5)] {
         let ray = LocalRay { o: center - d, d };
@@ -297,7 +336,7 @@ fn a_refitted_tree_finds_the_moved_triangles() {
     let twist = |p: Vec3| Quat::from_rotation_y(3.0 * p.y) * p + Vec3::new(5.0, 0.0, p.x);
     for count in [1, 5, 300] {
         let mesh = mesh_of(RawMesh::soup(count, 0.3, 1));
-        let mut tree = WideTree::build(&mesh);
+        let mut tree = WideTree::build(&mesh, SPLITS);
         let moved = mesh_of(RawMesh::soup(count, 0.3, 1).map(twist));
         tree.refit(&moved);
         assert_eq!(tree.bounds(), Aabb::from_points(moved.positions.iter().copied()));
