@@ -11,9 +11,9 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 /// no ray passes between them. Here in `f64` with vertices from `f32`.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleTest {
-    o: DVec3,
-    axes: [usize; 3],
-    shear: DVec3,
+    pub(crate) o: DVec3,
+    pub(crate) axes: [usize; 3],
+    pub(crate) shear: DVec3,
 }
 
 impl TriangleTest {

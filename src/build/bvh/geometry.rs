@@ -1,17 +1,17 @@
 //! Two levels: a tree per mesh in the mesh's own space, and a tree over the instances of a frame.
 
-use super::Bvh;
+use super::{Bvh, WideTree};
 use crate::description::TriangleMesh;
 use crate::extract::{Geometry, Instance, Instances, Meshes};
 use crate::math::{Aabb, MotionTransform, Ray};
-use crate::shape::{LocalRay, TriangleTest};
+use crate::shape::LocalRay;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Most triangles in a leaf of a mesh's tree.
-const TRIANGLES_PER_LEAF: usize = 4;
+/// Share of references that cutting large triangles may add to the tree of a mesh.
+const SPLIT_BUDGET: f32 = 0.1;
 /// Most instances in a leaf of the top level: a test of one costs a change of space.
 const INSTANCES_PER_LEAF: usize = 1;
 
@@ -20,18 +20,13 @@ const INSTANCES_PER_LEAF: usize = 1;
 pub struct MeshTree {
     /// The triangles.
     pub mesh: Arc<TriangleMesh>,
-    tree: Bvh,
+    tree: WideTree,
 }
 
 impl MeshTree {
     /// Builds the tree of a mesh.
     pub fn build(mesh: Arc<TriangleMesh>) -> Self {
-        let boxes: Vec<Aabb> = mesh
-            .triangles
-            .iter()
-            .map(|corners| Aabb::from_points(corners.map(|k| mesh.positions[k as usize])))
-            .collect();
-        let tree = Bvh::build(&boxes, TRIANGLES_PER_LEAF);
+        let tree = WideTree::build(&mesh, SPLIT_BUDGET);
         Self { mesh, tree }
     }
 
@@ -39,24 +34,6 @@ impl MeshTree {
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.mesh.triangles[triangle as usize].map(|k| self.mesh.positions[k as usize])
-    }
-
-    /// Offers the hits of the ray before `t_max` to `accept(t, triangle, weights)`, which returns the
-    /// new `t_max`.
-    #[inline]
-    fn intersect(
-        &self,
-        ray: &LocalRay,
-        t_max: f64,
-        mut accept: impl FnMut(f64, u32, DVec2) -> f64,
-    ) {
-        let test = TriangleTest::new(ray);
-        self.tree.traverse(ray, t_max, |triangle, t_max| {
-            match test.intersect(self.corners(triangle), t_max) {
-                Some((t, weights)) => accept(t, triangle, weights),
-                None => t_max,
-            }
-        });
     }
 }
 
@@ -170,12 +147,11 @@ impl SceneGeometry<'_> {
                 return t_max;
             }
             // Equal distances are let through, so that the tie is decided by `precedes`.
-            self.intersect(index, instance, ray, t_max.next_up(), |hit| {
-                if hit.t <= t_max && best.is_none_or(|best| hit.precedes(&best)) {
-                    best = Some(hit);
-                }
-                best.map_or(t_max, |best| best.t.min(t_max))
-            });
+            if let Some(hit) = self.hit_instance(index, instance, ray, t_max.next_up())
+                && best.is_none_or(|best| hit.precedes(&best))
+            {
+                best = Some(hit);
+            }
             best.map_or(t_max, |best| best.t)
         };
         // Strictly before the end of the ray.
@@ -191,10 +167,7 @@ impl SceneGeometry<'_> {
     pub fn occluded(&self, ray: &Ray, t_max: f64) -> bool {
         let mut blocked = false;
         let mut visit = |index: u32, t_max: f64| {
-            self.intersect(index, &self.instances[index as usize], ray, t_max, |_| {
-                blocked = true;
-                0.0
-            });
+            blocked = self.blocks(&self.instances[index as usize], ray, t_max);
             if blocked { 0.0 } else { t_max }
         };
         for &index in &self.top.unbounded {
@@ -206,37 +179,35 @@ impl SceneGeometry<'_> {
         blocked
     }
 
-    /// Offers the hits of one instance to `accept`, which returns the new end of the ray.
+    /// The nearest hit of one instance with `0 < t < t_max`.
     #[inline]
-    fn intersect(
-        &self,
-        index: u32,
-        instance: &Instance,
-        ray: &Ray,
-        t_max: f64,
-        mut accept: impl FnMut(Hit) -> f64,
-    ) {
-        let local = match &instance.motion {
-            MotionTransform::Static { inverse, .. } => local_ray(inverse, ray),
-            moving @ MotionTransform::Moving { .. } => local_ray(&moving.inverse_at(ray.time), ray),
-        };
+    fn hit_instance(&self, index: u32, instance: &Instance, ray: &Ray, t_max: f64) -> Option<Hit> {
+        let local = to_instance(instance, ray);
         match instance.geometry {
-            Geometry::Primitive(primitive) => {
-                if let Some(hit) = primitive.intersect(&local, t_max) {
-                    accept(Hit {
-                        t: hit.t,
-                        instance: index,
-                        primitive: hit.face,
-                        weights: DVec2::ZERO,
-                    });
-                }
-            }
+            Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).map(|hit| Hit {
+                t: hit.t,
+                instance: index,
+                primitive: hit.face,
+                weights: DVec2::ZERO,
+            }),
             Geometry::Mesh(mesh) => {
-                self.meshes[mesh as usize].intersect(&local, t_max, |t, triangle, weights| {
-                    // One more than the end, so that a second triangle at the same distance is seen.
-                    accept(Hit { t, instance: index, primitive: triangle, weights }).next_up()
-                });
+                self.meshes[mesh as usize].tree.closest_hit(&local, t_max).map(|hit| Hit {
+                    t: hit.t,
+                    instance: index,
+                    primitive: hit.triangle,
+                    weights: hit.weights,
+                })
             }
+        }
+    }
+
+    /// Whether one instance is hit with `0 < t < t_max`.
+    #[inline]
+    fn blocks(&self, instance: &Instance, ray: &Ray, t_max: f64) -> bool {
+        let local = to_instance(instance, ray);
+        match instance.geometry {
+            Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).is_some(),
+            Geometry::Mesh(mesh) => self.meshes[mesh as usize].tree.any_hit(&local, t_max),
         }
     }
 }
@@ -247,6 +218,14 @@ fn whole(ray: &Ray) -> LocalRay {
 }
 
 /// The ray in the space of an instance; its parameter counts as before.
+#[inline]
+fn to_instance(instance: &Instance, ray: &Ray) -> LocalRay {
+    match &instance.motion {
+        MotionTransform::Static { inverse, .. } => local_ray(inverse, ray),
+        moving @ MotionTransform::Moving { .. } => local_ray(&moving.inverse_at(ray.time), ray),
+    }
+}
+
 #[inline]
 fn local_ray(shape_from_render: &DAffine3, ray: &Ray) -> LocalRay {
     LocalRay {

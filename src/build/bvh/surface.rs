@@ -117,3 +117,62 @@ impl MeshTree {
         LocalSurface { p, ng, ns, uv: uv.as_vec2(), dpdu }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::TopLevel;
+    use super::*;
+    use crate::description::TriangleMesh;
+    use crate::extract::{Instance, NOTHING};
+    use crate::math::{Aabb, offset_ray_origin};
+    use crate::sampling::Sampler;
+    use glam::DQuat;
+    use std::sync::Arc;
+
+    /// Oracle: a ray which leaves a triangle to the side of its direction does not meet it again,
+    /// for triangles of a micrometre to a thousand kilometres, as far away, turned and stretched.
+    #[test]
+    fn no_ray_meets_the_triangle_that_it_leaves() {
+        for number in 0..20_000 {
+            let s = Sampler::new(8, 0, (number, 0), 0);
+            let three = |k| s.two(k).extend(s.one(k + 2)) - 0.5;
+            let positions = vec![three(0), three(3), three(6)];
+            let triangles = vec![[0, 1, 2]];
+            let mesh = TriangleMesh { positions, triangles, ..Default::default() };
+            let tree = Arc::new(MeshTree::build(Arc::new(mesh)));
+            let size = 10.0_f64.powf(f64::from(s.one(9)) * 12.0 - 6.0);
+            let distance = 10.0_f64.powf(f64::from(s.one(10)) * 14.0 - 7.0);
+            let forward = DAffine3::from_scale_rotation_translation(
+                DVec3::new(size, size * 0.01, -3.0 * size),
+                DQuat::from_scaled_axis(three(11).as_dvec3() * 6.0),
+                three(14).as_dvec3() * distance,
+            );
+            let inverse = forward.inverse();
+            let around = Aabb::from_points(tree.mesh.positions.iter().copied());
+            let instance = Instance {
+                geometry: Geometry::Mesh(0),
+                motion: MotionTransform::Static { forward, inverse },
+                bounds: around.transformed(&forward),
+                material: NOTHING,
+                emission: NOTHING,
+                object_id: 1,
+                needs_uv: false,
+                hidden_from_camera: false,
+            };
+            let instances = [instance];
+            let top = TopLevel::build(&instances);
+            let meshes = [tree.clone()];
+            let scene = SceneGeometry { instances: &instances, meshes: &meshes, top: &top };
+            let root = s.one(17).sqrt();
+            let weights = DVec2::new(f64::from(1.0 - root), f64::from(root * s.one(18)));
+            let surface = SurfacePoint::new(&tree.surface(0, weights), &forward, &inverse);
+            for k in 0..4 {
+                let d = (three(20 + 3 * k)).normalize();
+                let o = offset_ray_origin(surface.p, surface.p_error, surface.ng, d);
+                let ray = Ray { o, d, time: 0.0 };
+                assert!(!scene.occluded(&ray, f64::INFINITY), "triangle {number}, ray {k}");
+                assert_eq!(scene.closest_hit(&ray, f64::INFINITY, false), None);
+            }
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! The tests of boxes and triangles with the AVX2 instructions of x86-64.
+//!
+//! Chosen at run time where the processor has them. The operations and their order are those of the
+//! plain ones, without fused multiplication, so that the bits of a hit are the same.
+#![expect(unsafe_code, reason = "vector instructions, used only where the processor has them")]
+
+use super::WideTree;
+use super::node::{BLOCK, Block, Child, Node};
+use super::ray::BoxRay;
+use super::traverse::{BlockHits, Distances, Lanes, TriangleHit, any_hit, closest_hit};
+use crate::shape::{LocalRay, TriangleTest};
+use std::arch::x86_64::{
+    __m256, __m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ, _MM_HINT_T0, _mm_loadu_ps,
+    _mm_prefetch, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_cmp_pd, _mm256_cmp_ps,
+    _mm256_cvtps_pd, _mm256_div_pd, _mm256_load_ps, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd,
+    _mm256_min_ps, _mm256_movemask_pd, _mm256_movemask_ps, _mm256_mul_pd, _mm256_mul_ps,
+    _mm256_set1_pd, _mm256_set1_ps, _mm256_setzero_pd, _mm256_setzero_ps, _mm256_store_pd,
+    _mm256_store_ps, _mm256_sub_pd, _mm256_sub_ps,
+};
+
+/// The proof that this processor has the instructions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Avx2(());
+
+#[expect(clippy::unused_self, reason = "the value is the proof")]
+impl Avx2 {
+    /// `None` where the processor lacks them. The standard library asks the processor once.
+    #[inline]
+    pub(super) fn detect() -> Option<Self> {
+        let present = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("popcnt");
+        present.then_some(Self(()))
+    }
+
+    #[inline]
+    pub(super) fn closest_hit<const STACK: usize>(
+        self,
+        tree: &WideTree,
+        ray: &LocalRay,
+        t_max: f64,
+    ) -> Option<TriangleHit> {
+        // SAFETY: a value of this type exists only where the features were detected.
+        unsafe { closest_hit_avx2::<STACK>(tree, ray, t_max) }
+    }
+
+    #[inline]
+    pub(super) fn any_hit<const STACK: usize>(
+        self,
+        tree: &WideTree,
+        ray: &LocalRay,
+        t_max: f64,
+    ) -> bool {
+        // SAFETY: a value of this type exists only where the features were detected.
+        unsafe { any_hit_avx2::<STACK>(tree, ray, t_max) }
+    }
+}
+
+#[target_feature(enable = "avx2,bmi1,popcnt")]
+fn closest_hit_avx2<const STACK: usize>(
+    tree: &WideTree,
+    ray: &LocalRay,
+    t_max: f64,
+) -> Option<TriangleHit> {
+    closest_hit::<Vectors, STACK>(tree, ray, t_max)
+}
+
+#[target_feature(enable = "avx2,bmi1,popcnt")]
+fn any_hit_avx2<const STACK: usize>(tree: &WideTree, ray: &LocalRay, t_max: f64) -> bool {
+    any_hit::<Vectors, STACK>(tree, ray, t_max)
+}
+
+/// The vector tests. Private: they are instantiated only by the two functions above, which have the
+/// features and into which they are inlined.
+struct Vectors;
+
+/// A ray in every lane, for boxes.
+#[derive(Clone, Copy)]
+struct BoxLanes {
+    near_origin: [__m256; 3],
+    far_origin: [__m256; 3],
+    near_inverse: [__m256; 3],
+    far_inverse: [__m256; 3],
+    near_planes: [usize; 3],
+}
+
+/// A ray in every lane, for triangles.
+#[derive(Clone, Copy)]
+struct TriangleLanes {
+    o: [__m256d; 3],
+    shear: [__m256d; 3],
+    axes: [usize; 3],
+}
+
+// These are functions rather than closures, since a closure cannot be made to be inlined, and outside
+// a function with the features an instruction becomes a call.
+
+#[inline(always)]
+fn lanes_of(v: [f32; 3]) -> [__m256; 3] {
+    // SAFETY: runs only inside the two functions with the features.
+    unsafe { [_mm256_set1_ps(v[0]), _mm256_set1_ps(v[1]), _mm256_set1_ps(v[2])] }
+}
+
+#[inline(always)]
+fn wide_lanes_of(v: [f64; 3]) -> [__m256d; 3] {
+    // SAFETY: runs only inside the two functions with the features.
+    unsafe { [_mm256_set1_pd(v[0]), _mm256_set1_pd(v[1]), _mm256_set1_pd(v[2])] }
+}
+
+/// Corners as seen from the origin of the ray, along one axis.
+#[inline(always)]
+fn from_origin(row: &[f32; BLOCK], o: __m256d) -> __m256d {
+    // SAFETY: runs only inside the two functions with the features; the load is unaligned.
+    unsafe { _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(row.as_ptr())), o) }
+}
+
+/// Corners moved to the origin of the ray and sheared so that it runs along z.
+#[inline(always)]
+fn sheared(ray: &TriangleLanes, corner: &[[f32; BLOCK]; 3]) -> (__m256d, __m256d, __m256d) {
+    let [kx, ky, kz] = ray.axes;
+    let z = from_origin(&corner[kz], ray.o[2]);
+    let (x, y) = (from_origin(&corner[kx], ray.o[0]), from_origin(&corner[ky], ray.o[1]));
+    // SAFETY: runs only inside the two functions with the features.
+    unsafe {
+        let x = _mm256_sub_pd(x, _mm256_mul_pd(ray.shear[0], z));
+        let y = _mm256_sub_pd(y, _mm256_mul_pd(ray.shear[1], z));
+        (x, y, z)
+    }
+}
+
+/// `p·q − r·s`, rounded as written: a fused product would open the seams.
+#[inline(always)]
+fn edge(p: __m256d, q: __m256d, r: __m256d, s: __m256d) -> __m256d {
+    // SAFETY: runs only inside the two functions with the features.
+    unsafe { _mm256_sub_pd(_mm256_mul_pd(p, q), _mm256_mul_pd(r, s)) }
+}
+
+impl Lanes for Vectors {
+    type Boxes = BoxLanes;
+    type Triangles = TriangleLanes;
+
+    #[inline(always)]
+    fn prepare_boxes(ray: &BoxRay) -> BoxLanes {
+        BoxLanes {
+            near_origin: lanes_of(ray.near_origin),
+            far_origin: lanes_of(ray.far_origin),
+            near_inverse: lanes_of(ray.near_inverse),
+            far_inverse: lanes_of(ray.far_inverse),
+            near_planes: ray.near_planes,
+        }
+    }
+
+    #[inline(always)]
+    fn prepare_triangles(test: &TriangleTest) -> TriangleLanes {
+        let axes = test.axes;
+        let o = [test.o[axes[0]], test.o[axes[1]], test.o[axes[2]]];
+        TriangleLanes { o: wide_lanes_of(o), shear: wide_lanes_of(test.shear.to_array()), axes }
+    }
+
+    #[inline(always)]
+    fn enter(ray: &BoxLanes, node: &Node, end: f32, distances: &mut Distances) -> u32 {
+        // SAFETY: runs only inside the two functions with the features. The rows of planes are 32
+        // bytes long in a type aligned to 64, and distances are aligned to 32.
+        unsafe {
+            let mut near = _mm256_setzero_ps();
+            let mut far = _mm256_set1_ps(end);
+            for axis in 0..3 {
+                let plane = ray.near_planes[axis];
+                let enter = _mm256_load_ps(node.planes[plane].as_ptr());
+                let leave = _mm256_load_ps(node.planes[plane ^ 1].as_ptr());
+                // Minimum and maximum return their second operand where one is NaN.
+                let a = _mm256_mul_ps(
+                    _mm256_sub_ps(ray.near_origin[axis], enter),
+                    ray.near_inverse[axis],
+                );
+                near = _mm256_max_ps(a, near);
+                let b = _mm256_mul_ps(
+                    _mm256_sub_ps(ray.far_origin[axis], leave),
+                    ray.far_inverse[axis],
+                );
+                far = _mm256_min_ps(b, far);
+            }
+            _mm256_store_ps(distances.0.as_mut_ptr(), near);
+            _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32
+        }
+    }
+
+    #[inline(always)]
+    fn hit(ray: &TriangleLanes, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32 {
+        // SAFETY: runs only inside the two functions with the features. The rows of
+        // the hits are 32 bytes long in a type aligned to 32.
+        unsafe {
+            let (ax, ay, az) = sheared(ray, &block.corners[0]);
+            let (bx, by, bz) = sheared(ray, &block.corners[1]);
+            let (cx, cy, cz) = sheared(ray, &block.corners[2]);
+            let u = edge(cx, by, cy, bx);
+            let v = edge(ax, cy, ay, cx);
+            let w = edge(bx, ay, by, ax);
+            let zero = _mm256_setzero_pd();
+            let negative = _mm256_cmp_pd::<_CMP_LT_OQ>(_mm256_min_pd(_mm256_min_pd(u, v), w), zero);
+            let positive = _mm256_cmp_pd::<_CMP_GT_OQ>(_mm256_max_pd(_mm256_max_pd(u, v), w), zero);
+            let det = _mm256_add_pd(_mm256_add_pd(u, v), w);
+            let inside = _mm256_andnot_pd(
+                _mm256_and_pd(negative, positive),
+                _mm256_cmp_pd::<_CMP_NEQ_UQ>(det, zero),
+            );
+            if _mm256_movemask_pd(inside) == 0 {
+                return 0;
+            }
+            let inverse = _mm256_div_pd(_mm256_set1_pd(1.0), det);
+            let depth = _mm256_add_pd(
+                _mm256_add_pd(_mm256_mul_pd(u, az), _mm256_mul_pd(v, bz)),
+                _mm256_mul_pd(w, cz),
+            );
+            let t = _mm256_mul_pd(_mm256_mul_pd(depth, ray.shear[2]), inverse);
+            let in_range = _mm256_and_pd(
+                _mm256_cmp_pd::<_CMP_GT_OQ>(t, zero),
+                _mm256_cmp_pd::<_CMP_LT_OQ>(t, _mm256_set1_pd(t_max)),
+            );
+            let mask = _mm256_movemask_pd(_mm256_and_pd(inside, in_range)) as u32;
+            if mask != 0 {
+                _mm256_store_pd(hits.t.as_mut_ptr(), t);
+                _mm256_store_pd(hits.second.as_mut_ptr(), _mm256_mul_pd(v, inverse));
+                _mm256_store_pd(hits.third.as_mut_ptr(), _mm256_mul_pd(w, inverse));
+            }
+            mask
+        }
+    }
+
+    #[inline(always)]
+    fn prefetch(tree: &WideTree, child: Child) {
+        let (address, lines) = if child.is_leaf() {
+            (tree.blocks.as_ptr().wrapping_add(child.blocks().start).cast::<i8>(), 3)
+        } else {
+            (tree.nodes.as_ptr().wrapping_add(child.index()).cast::<i8>(), 4)
+        };
+        for line in 0..lines {
+            // SAFETY: a prefetch reads nothing, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.wrapping_add(64 * line)) };
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! The way of a ray through the tree, and the tests of boxes and triangles in plain Rust.
+//!
+//! Closest hit: the children that the ray enters are visited from near to far, and those beyond the
+//! best hit are dropped. Any hit: in whatever order, until something is met.
+//!
+//! Boxes are tested in `f32`, conservatively ([`BoxRay`]); triangles in `f64`, by the same operations
+//! in the same order as [`TriangleTest`]; a hit counts if the ray also meets the box of the triangle
+//! ([`BoxRay::reaches`]). So the answer is that of testing every triangle by itself, bit for bit,
+//! whatever the tree looks like and whichever set of instructions ran.
+
+use super::WideTree;
+use super::node::{BLOCK, Block, Child, Node, WIDTH};
+use super::ray::BoxRay;
+use crate::shape::{LocalRay, TriangleTest};
+use glam::{DVec2, Vec3};
+
+/// Where a ray meets a triangle of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleHit {
+    /// Ray parameter.
+    pub t: f64,
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Weights of its second and third corner.
+    pub weights: DVec2,
+}
+
+/// Hits of the triangles of a block, by lane; only lanes which were hit have a meaning.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(super) struct BlockHits {
+    pub(super) t: [f64; BLOCK],
+    pub(super) second: [f64; BLOCK],
+    pub(super) third: [f64; BLOCK],
+}
+
+/// Distances at which the boxes of a node are entered.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(32))]
+pub(super) struct Distances(pub(super) [f32; WIDTH]);
+
+/// A test of eight boxes and one of four triangles, for one ray.
+///
+/// Bit `k` of a returned mask stands for lane `k`.
+pub(super) trait Lanes {
+    /// The ray as the box test wants it.
+    type Boxes: Copy;
+    /// The ray as the triangle test wants it.
+    type Triangles: Copy;
+
+    fn prepare_boxes(ray: &BoxRay) -> Self::Boxes;
+    fn prepare_triangles(test: &TriangleTest) -> Self::Triangles;
+
+    /// Which boxes the ray meets at a distance in `[0, end]`, and where.
+    fn enter(ray: &Self::Boxes, node: &Node, end: f32, distances: &mut Distances) -> u32;
+
+    /// Which triangles the ray meets with `0 < t < t_max`, and where.
+    fn hit(ray: &Self::Triangles, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32;
+
+    /// Asks for the memory of a child ahead of time.
+    fn prefetch(tree: &WideTree, child: Child);
+}
+
+/// The tests in plain Rust, for any processor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Portable;
+
+impl Lanes for Portable {
+    type Boxes = BoxRay;
+    type Triangles = TriangleTest;
+
+    #[inline(always)]
+    fn prepare_boxes(ray: &BoxRay) -> BoxRay {
+        *ray
+    }
+
+    #[inline(always)]
+    fn prepare_triangles(test: &TriangleTest) -> TriangleTest {
+        *test
+    }
+
+    #[inline(always)]
+    fn enter(ray: &BoxRay, node: &Node, end: f32, distances: &mut Distances) -> u32 {
+        let (mut near, mut far) = ([0.0; WIDTH], [end; WIDTH]);
+        for axis in 0..3 {
+            let plane = ray.near_planes[axis];
+            let (enter, leave) = (&node.planes[plane], &node.planes[plane ^ 1]);
+            for lane in 0..WIDTH {
+                // NaN compares false and leaves the distance as it is.
+                let a = (ray.near_origin[axis] - enter[lane]) * ray.near_inverse[axis];
+                near[lane] = if a > near[lane] { a } else { near[lane] };
+                let b = (ray.far_origin[axis] - leave[lane]) * ray.far_inverse[axis];
+                far[lane] = if b < far[lane] { b } else { far[lane] };
+            }
+        }
+        distances.0 = near;
+        (0..WIDTH).fold(0, |mask, lane| mask | (u32::from(near[lane] <= far[lane]) << lane))
+    }
+
+    #[inline(always)]
+    fn hit(ray: &TriangleTest, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32 {
+        let mut mask = 0;
+        for lane in 0..BLOCK {
+            if let Some((t, weights)) = ray.intersect(block.get(lane), t_max) {
+                hits.t[lane] = t;
+                (hits.second[lane], hits.third[lane]) = (weights.x, weights.y);
+                mask |= 1 << lane;
+            }
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn prefetch(_: &WideTree, _: Child) {}
+}
+
+/// A child on the stack: its distance in the upper half, so that keys sort by distance (which is not
+/// negative, and the bits of such numbers are in their order).
+type Key = u64;
+
+#[inline(always)]
+fn key(distance: f32, child: Child) -> Key {
+    u64::from(distance.to_bits()) << 32 | u64::from(child.0)
+}
+
+#[inline(always)]
+fn child_of(key: Key) -> Child {
+    Child(key as u32)
+}
+
+#[inline(always)]
+fn distance_of(key: Key) -> f32 {
+    f32::from_bits((key >> 32) as u32)
+}
+
+/// The lanes of a mask, from the lowest.
+#[inline(always)]
+fn take_lane(mask: &mut u32) -> usize {
+    let lane = mask.trailing_zeros() as usize;
+    *mask &= *mask - 1;
+    lane % WIDTH
+}
+
+/// [`BoxRay::reaches`], for a ray that was prepared already or is now.
+#[inline(always)]
+fn is_met(ray: &LocalRay, prepared: Option<&BoxRay>, corners: [Vec3; 3], t: f64) -> bool {
+    match prepared {
+        Some(prepared) => prepared.reaches(corners, t),
+        None => BoxRay::new(ray).is_some_and(|prepared| prepared.reaches(corners, t)),
+    }
+}
+
+/// Lowers `best` and `t_max` to the nearest hit in a leaf.
+#[inline(always)]
+fn nearest_of_leaf<L: Lanes>(
+    tree: &WideTree,
+    leaf: Child,
+    ray: &LocalRay,
+    prepared: Option<&BoxRay>,
+    triangles: &L::Triangles,
+    t_max: &mut f64,
+    best: &mut Option<TriangleHit>,
+) {
+    let mut hits = BlockHits::default();
+    for block in &tree.blocks[leaf.blocks()] {
+        let mut mask = L::hit(triangles, block, *t_max, &mut hits);
+        while mask != 0 {
+            let lane = take_lane(&mut mask) % BLOCK;
+            let (t, triangle) = (hits.t[lane], block.triangles[lane]);
+            if best.is_none_or(|best| (t, triangle) < (best.t, best.triangle))
+                && is_met(ray, prepared, block.get(lane), t)
+            {
+                let weights = DVec2::new(hits.second[lane], hits.third[lane]);
+                *best = Some(TriangleHit { t, triangle, weights });
+                // Another triangle at the same distance is still to be seen.
+                *t_max = t.next_up();
+            }
+        }
+    }
+}
+
+/// Whether any triangle of a leaf is hit.
+#[inline(always)]
+fn leaf_blocks<L: Lanes>(
+    tree: &WideTree,
+    leaf: Child,
+    ray: &LocalRay,
+    prepared: Option<&BoxRay>,
+    triangles: &L::Triangles,
+    t_max: f64,
+) -> bool {
+    let mut hits = BlockHits::default();
+    for block in &tree.blocks[leaf.blocks()] {
+        let mut mask = L::hit(triangles, block, t_max, &mut hits);
+        while mask != 0 {
+            let lane = take_lane(&mut mask) % BLOCK;
+            if is_met(ray, prepared, block.get(lane), hits.t[lane]) {
+                return true;
+            }
+        }
+    }
+    false
+}
+
+/// The child in the lowest lane of a mask, asked for ahead of time.
+#[inline(always)]
+fn take_child<L: Lanes>(
+    tree: &WideTree,
+    node: &Node,
+    distances: &Distances,
+    mask: &mut u32,
+) -> Key {
+    let lane = take_lane(mask);
+    let child = node.children[lane];
+    L::prefetch(tree, child);
+    key(distances.0[lane], child)
+}
+
+/// The nearest hit with `0 < t < t_max`; among equal ones that of the lowest triangle.
+///
+/// `STACK` is at least what the tree needs.
+#[inline(always)]
+pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
+    tree: &WideTree,
+    ray: &LocalRay,
+    mut t_max: f64,
+) -> Option<TriangleHit> {
+    let triangles = L::prepare_triangles(&TriangleTest::new(ray));
+    let mut best = None;
+    if tree.root.is_leaf() {
+        nearest_of_leaf::<L>(tree, tree.root, ray, None, &triangles, &mut t_max, &mut best);
+        return best;
+    }
+    let prepared = BoxRay::new(ray)?;
+    let boxes = L::prepare_boxes(&prepared);
+    let mut end = prepared.distance(t_max);
+    let mut stack = [0_u64; STACK];
+    let mut depth = 0;
+    let mut distances = Distances::default();
+    let mut current = tree.root;
+    loop {
+        if current.is_leaf() {
+            let before = t_max;
+            nearest_of_leaf::<L>(
+                tree,
+                current,
+                ray,
+                Some(&prepared),
+                &triangles,
+                &mut t_max,
+                &mut best,
+            );
+            if t_max < before {
+                end = prepared.distance(t_max);
+            }
+        } else {
+            let node = &tree.nodes[current.index()];
+            let mut mask = L::enter(&boxes, node, end, &mut distances);
+            if mask != 0 {
+                let a = take_child::<L>(tree, node, &distances, &mut mask);
+                if mask == 0 {
+                    current = child_of(a);
+                    continue;
+                }
+                let b = take_child::<L>(tree, node, &distances, &mut mask);
+                let (a, b) = (a.min(b), a.max(b));
+                if mask == 0 {
+                    stack[depth] = b;
+                    depth += 1;
+                    current = child_of(a);
+                    continue;
+                }
+                let c = take_child::<L>(tree, node, &distances, &mut mask);
+                let (a, c) = (a.min(c), a.max(c));
+                let (b, c) = (b.min(c), b.max(c));
+                if mask == 0 {
+                    stack[depth] = c;
+                    stack[depth + 1] = b;
+                    depth += 2;
+                    current = child_of(a);
+                    continue;
+                }
+                let bottom = depth;
+                for key in [c, b, a] {
+                    stack[depth] = key;
+                    depth += 1;
+                }
+                while mask != 0 {
+                    let key = take_child::<L>(tree, node, &distances, &mut mask);
+                    let mut place = depth;
+                    while place > bottom && stack[place - 1] < key {
+                        stack[place] = stack[place - 1];
+                        place -= 1;
+                    }
+                    stack[place] = key;
+                    depth += 1;
+                }
+                depth -= 1;
+                current = child_of(stack[depth]);
+                continue;
+            }
+        }
+        loop {
+            if depth == 0 {
+                return best;
+            }
+            depth -= 1;
+            if distance_of(stack[depth]) <= end {
+                current = child_of(stack[depth]);
+                break;
+            }
+        }
+    }
+}
+
+/// Whether anything is met with `0 < t < t_max`.
+///
+/// `STACK` is at least what the tree needs.
+#[inline(always)]
+pub(super) fn any_hit<L: Lanes, const STACK: usize>(
+    tree: &WideTree,
+    ray: &LocalRay,
+    t_max: f64,
+) -> bool {
+    let triangles = L::prepare_triangles(&TriangleTest::new(ray));
+    if tree.root.is_leaf() {
+        return leaf_blocks::<L>(tree, tree.root, ray, None, &triangles, t_max);
+    }
+    let Some(prepared) = BoxRay::new(ray) else { return false };
+    let boxes = L::prepare_boxes(&prepared);
+    let end = prepared.distance(t_max);
+    let mut stack = [Child::NOTHING; STACK];
+    let mut depth = 0;
+    let mut distances = Distances::default();
+    let mut current = tree.root;
+    loop {
+        if current.is_leaf() {
+            if leaf_blocks::<L>(tree, current, ray, Some(&prepared), &triangles, t_max) {
+                return true;
+            }
+        } else {
+            let node = &tree.nodes[current.index()];
+            let mut mask = L::enter(&boxes, node, end, &mut distances);
+            while mask != 0 {
+                let child = node.children[take_lane(&mut mask)];
+                L::prefetch(tree, child);
+                stack[depth] = child;
+                depth += 1;
+            }
+        }
+        if depth == 0 {
+            return false;
+        }
+        depth -= 1;
+        current = stack[depth];
+    }
+}
