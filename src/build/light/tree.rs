@@ -218,9 +218,8 @@ impl LightTree {
     pub fn sample(&self, p: Vec3, normal: Option<Vec3>, mut u: f64) -> Option<(u32, f32)> {
         let mut node = 0;
         let mut probability = 1.0_f64;
-        if self.nodes.first()?.importance(p, normal) <= 0.0 {
-            return None;
-        }
+        // The root itself is not asked: a light without a choice is drawn wherever it shines.
+        self.nodes.first()?;
         loop {
             let Node { is_leaf, link, .. } = self.nodes[node];
             if is_leaf {
@@ -243,7 +242,7 @@ impl LightTree {
     /// The probability with which [`LightTree::sample`] draws a light.
     pub fn probability(&self, light: u32, p: Vec3, normal: Option<Vec3>) -> f32 {
         let mut node = self.leaf[light as usize];
-        if node == u32::MAX || self.nodes[0].importance(p, normal) <= 0.0 {
+        if node == u32::MAX {
             return 0.0;
         }
         let mut probability = 1.0_f64;
