@@ -44,17 +44,7 @@ fn everything() -> SceneDescription {
         mesh_text("ball", &icosphere(1, true)),
     );
     let mut description = scene(&text);
-    description.render.layers = vec![
-        Layer::Beauty,
-        Layer::Albedo,
-        Layer::Normal,
-        Layer::Depth,
-        Layer::Position,
-        Layer::Motion,
-        Layer::ObjectId,
-        Layer::Samples,
-        Layer::Variance,
-    ];
+    description.render.layers = Layer::ALL.to_vec();
     description
 }
 

@@ -159,6 +159,21 @@ pub enum Layer {
     Variance,
 }
 
+impl Layer {
+    /// Every layer once.
+    pub const ALL: [Self; 9] = [
+        Self::Beauty,
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::Position,
+        Self::Motion,
+        Self::ObjectId,
+        Self::Samples,
+        Self::Variance,
+    ];
+}
+
 fn box_radius() -> f32 {
     0.5
 }

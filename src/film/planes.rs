@@ -108,21 +108,9 @@ mod tests {
     use crate::film::{FirstHit, PixelSample, Tile};
     use glam::{Vec2, Vec3};
 
-    const ALL: [Layer; 9] = [
-        Layer::Beauty,
-        Layer::Albedo,
-        Layer::Normal,
-        Layer::Depth,
-        Layer::Position,
-        Layer::Motion,
-        Layer::ObjectId,
-        Layer::Samples,
-        Layer::Variance,
-    ];
-
     /// Two pixels: the left one is met by two samples of three, the right one by none.
     fn film() -> Film {
-        let mut film = Film::new((2, 1), &ALL).expect("small");
+        let mut film = Film::new((2, 1), &Layer::ALL).expect("small");
         let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: 2, y1: 1 });
         let hit = |depth: f32| FirstHit {
             albedo: Rgb::new(depth, 0.0, 0.0),

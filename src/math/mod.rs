@@ -12,4 +12,4 @@ pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
 pub use ray::Ray;
 
-pub use rounding::{gamma, gamma_f64, next_after_magnitude, offset_ray_origin};
+pub use rounding::{gamma, gamma_f64, offset_ray_origin};

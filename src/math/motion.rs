@@ -153,18 +153,6 @@ impl MotionTransform {
             Self::Moving { .. } => self.at(u).inverse(),
         }
     }
-
-    /// The largest angle, in radians, that the rotation turns between two neighbouring keys.
-    pub fn widest_turn(&self) -> f64 {
-        match self {
-            Self::Static { .. } => 0.0,
-            Self::Moving { keys } => keys
-                .windows(2)
-                .map(|pair| pair[0].rotation.angle_between(pair[1].rotation))
-                .map(|angle| angle.min(std::f64::consts::TAU - angle))
-                .fold(0.0, f64::max),
-        }
-    }
 }
 
 #[cfg(test)]

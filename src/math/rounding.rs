@@ -18,11 +18,9 @@ pub const fn gamma_f64(n: u32) -> f64 {
     nu / (1.0 - nu)
 }
 
-/// The next `f32` away from zero (`up` away from zero for positive `x` when `direction` is positive).
-///
-/// Moves `x` by one unit in the last place towards `direction`'s sign: up for a positive
-/// direction, down for a negative one, not at all for zero.
-pub fn next_after_magnitude(x: f32, direction: f64) -> f32 {
+/// Moves `x` by one unit in the last place: up for a positive direction, down for a negative one, not
+/// at all for zero.
+fn step_along(x: f32, direction: f64) -> f32 {
     if direction > 0.0 {
         x.next_up()
     } else if direction < 0.0 {
@@ -52,9 +50,9 @@ pub fn offset_ray_origin(p: DVec3, p_error: DVec3, ng: Vec3, dir: Vec3) -> Vec3 
     let offset = n * (distance * side);
     let moved = p + offset;
     Vec3::new(
-        next_after_magnitude(moved.x as f32, offset.x),
-        next_after_magnitude(moved.y as f32, offset.y),
-        next_after_magnitude(moved.z as f32, offset.z),
+        step_along(moved.x as f32, offset.x),
+        step_along(moved.y as f32, offset.y),
+        step_along(moved.z as f32, offset.z),
     )
 }
 

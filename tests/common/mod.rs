@@ -114,25 +114,18 @@ impl Picture {
 
     /// Whether two pictures are equal bit by bit, in every layer that both have.
     pub fn same_bits(&self, other: &Self) -> bool {
-        const LAYERS: [Layer; 9] = [
-            Layer::Beauty,
-            Layer::Albedo,
-            Layer::Normal,
-            Layer::Depth,
-            Layer::Position,
-            Layer::Motion,
-            Layer::ObjectId,
-            Layer::Samples,
-            Layer::Variance,
-        ];
-        LAYERS.into_iter().all(|layer| match (self.film.image(layer), other.film.image(layer)) {
-            (Some(a), Some(b)) => a.iter().zip(&b).all(|(a, b)| match (&a.samples, &b.samples) {
-                (PlaneSamples::F32(a), PlaneSamples::F32(b)) => {
-                    a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+        Layer::ALL.into_iter().all(|layer| {
+            match (self.film.image(layer), other.film.image(layer)) {
+                (Some(a), Some(b)) => {
+                    a.iter().zip(&b).all(|(a, b)| match (&a.samples, &b.samples) {
+                        (PlaneSamples::F32(a), PlaneSamples::F32(b)) => {
+                            a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+                        }
+                        (a, b) => a == b,
+                    })
                 }
-                (a, b) => a == b,
-            }),
-            (a, b) => a.is_none() && b.is_none(),
+                (a, b) => a.is_none() && b.is_none(),
+            }
         })
     }
 }

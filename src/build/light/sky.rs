@@ -24,7 +24,7 @@ pub struct SkyLight {
 }
 
 impl SkyLight {
-    /// Prepares a sky. `luminance` makes a number of a colour.
+    /// Prepares a sky.
     pub fn new(radiance: Value<Rgb, u32>, scale: f32, materials: &MaterialTable) -> Self {
         let texture = match &radiance {
             Value::Constant(_) => None,
