@@ -3,6 +3,7 @@
 mod film_pass;
 mod path;
 mod scene_view;
+mod vertex;
 
 pub use film_pass::{IntegrateStatus, render_film};
 pub use path::{PathCounters, PathTracer};

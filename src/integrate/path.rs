@@ -12,20 +12,17 @@
 //! and lobes without extent) has weight 1 there. Paths end by Russian roulette on their throughput,
 //! the scale `η²` of refraction taken out of it: the survivors are divided by the probability to
 //! survive, which keeps the mean.
-//!
-//! Which side of a surface a direction leaves by is decided by the geometric normal. The shading
-//! normal shapes the BSDF; a specular direction which ends up on the wrong side is drawn again around
-//! the geometric normal, any other is dropped.
 
 use super::SceneView;
+use super::vertex::Vertex;
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
 use crate::description::Rgb;
 use crate::extract::{CameraRay, NOTHING};
 use crate::film::{FirstHit, PixelSample};
-use crate::math::{Frame, Ray, offset_ray_origin};
+use crate::math::{Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
-use crate::shade::{Bsdf, BsdfSample, TransportMode};
+use crate::shade::Bsdf;
 use glam::{DVec3, Vec2, Vec3};
 
 /// The path tracer with its settings.
@@ -72,14 +69,6 @@ enum Arrival {
     Sure,
     /// In a direction of this density from this receiver.
     Drawn { from: Receiver, pdf: f32 },
-}
-
-/// A point on a path.
-struct Vertex<'a> {
-    surface: SurfacePoint,
-    frame: Frame,
-    wo: Vec3,
-    bsdf: Bsdf<'a>,
 }
 
 impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORPTION> {
@@ -346,62 +335,5 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
             motion,
             object_id: scene.geometry.instances[hit.instance as usize].object_id,
         }
-    }
-}
-
-impl<'a> Vertex<'a> {
-    fn new(mut surface: SurfacePoint, wo: Vec3, bsdf: Bsdf<'a>) -> Self {
-        // Seen from beyond its horizon a shading normal cannot say what is reflected where.
-        if wo.dot(surface.ns) * wo.dot(surface.ng) <= 0.0 {
-            surface.ns = surface.ng;
-        }
-        Self { surface, frame: surface.frame(), wo, bsdf }
-    }
-
-    fn receiver(&self) -> Receiver {
-        let SurfacePoint { p, p_error, ng, ns, .. } = self.surface;
-        let facing = if self.wo.dot(ns) < 0.0 { -ns } else { ns };
-        let horizon = (!self.bsdf.transmits()).then_some(facing);
-        Receiver { p, p_error, ng, facing, horizon }
-    }
-
-    /// Whether `wi` leaves by the side on which the BSDF placed it.
-    fn is_consistent(&self, wi: Vec3) -> bool {
-        let ns = self.surface.ns;
-        self.crosses(wi) == ((wi.dot(ns) > 0.0) != (self.wo.dot(ns) > 0.0))
-    }
-
-    /// Whether `wi` leaves on the other side of the surface than the path arrived from.
-    fn crosses(&self, wi: Vec3) -> bool {
-        let ng = self.surface.ng;
-        (wi.dot(ng) > 0.0) != (self.wo.dot(ng) > 0.0)
-    }
-
-    /// `f·|cos θ|` towards a light, and the density with which the BSDF draws that direction.
-    fn evaluate(&self, wi: Vec3) -> (Rgb, f32) {
-        if !self.is_consistent(wi) {
-            return (Rgb::ZERO, 0.0);
-        }
-        let (wo, wi) = (self.frame.to_local(self.wo), self.frame.to_local(wi));
-        let value = self.bsdf.evaluate(wo, wi, TransportMode::Radiance);
-        (value.f_cos, value.pdf)
-    }
-
-    /// Draws where the path goes on.
-    fn scatter(&self, lobe: f32, u: Vec2) -> Option<(Vec3, BsdfSample)> {
-        let draw = |frame: &Frame| {
-            let wo = frame.to_local(self.wo);
-            let sample = self.bsdf.sample(wo, lobe, u, TransportMode::Radiance)?;
-            Some((frame.from_local(sample.wi).normalize(), sample))
-        };
-        let (wi, sample) = draw(&self.frame)?;
-        if self.crosses(wi) == sample.transmitted {
-            return Some((wi, sample));
-        }
-        if !sample.delta {
-            return None;
-        }
-        let (wi, sample) = draw(&Frame::from_z(self.surface.ng))?;
-        (self.crosses(wi) == sample.transmitted).then_some((wi, sample))
     }
 }
