@@ -37,6 +37,13 @@ pub struct RenderSettings {
     pub max_depth: u32,
     /// Interactions before Russian roulette may end a path. Trades variance for time; no bias.
     pub roulette_depth: u32,
+    /// What the throughput of a path is multiplied by to be its probability to survive Russian
+    /// roulette. Trades variance for time; no bias.
+    pub roulette_gain: f32,
+    /// Side, in pixels, of the groups of pixels whose paths use each other's continuations; 1 for none.
+    /// Trades the independence of the noise of neighbouring pixels, and shadow rays, for less of it; no
+    /// bias.
+    pub share: u32,
     /// How light is simulated.
     pub integrator: IntegratorChoice,
     /// Seed of every random decision.
@@ -65,7 +72,9 @@ impl Default for RenderSettings {
             size: (640, 480),
             samples: 64,
             max_depth: 1000,
-            roulette_depth: 4,
+            roulette_depth: 2,
+            roulette_gain: 2.5,
+            share: 4,
             integrator: IntegratorChoice::Auto,
             seed: 0,
             filter: Filter::default(),

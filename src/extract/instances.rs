@@ -53,6 +53,13 @@ pub struct Meshes {
     slots: EntityHashMap<(u32, Aabb)>,
 }
 
+impl Meshes {
+    /// The index of the mesh of an entity.
+    pub(super) fn slot(&self, entity: Entity) -> Option<u32> {
+        self.slots.get(&entity).map(|(slot, _)| *slot)
+    }
+}
+
 /// Writes [`Meshes`] when one was added, replaced or removed.
 pub fn extract_meshes(
     changed: Query<(), Changed<Mesh>>,
@@ -80,6 +87,13 @@ pub struct Instances {
     pub rewritten: usize,
     /// What refers to an entity which is not what it should be, in words.
     pub dangling: Vec<String>,
+}
+
+impl Instances {
+    /// The index of the instance of an entity.
+    pub(super) fn slot(&self, entity: Entity) -> Option<u32> {
+        self.slots.get(&entity).copied()
+    }
 }
 
 type ObjectQuery<'w, 's> = Query<

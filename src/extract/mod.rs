@@ -9,6 +9,7 @@ mod camera;
 mod instances;
 mod lights;
 mod requirements;
+mod resting;
 mod surfaces;
 
 pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
@@ -17,6 +18,7 @@ pub use instances::{
 };
 pub use lights::{PunctualLight, PunctualLights, extract_lights};
 pub use requirements::{Feature, Requirements, derive_requirements};
+pub use resting::{RestingMesh, RestingMeshes, extract_resting_meshes};
 pub use surfaces::{SurfaceEmission, SurfaceSlots, Surfaces, extract_surfaces};
 
 use crate::frame::FrameSystems;
@@ -28,6 +30,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(ViewCamera::default());
     world.insert_resource(Meshes::default());
     world.insert_resource(Instances::default());
+    world.insert_resource(RestingMeshes::default());
     world.insert_resource(Surfaces::default());
     world.insert_resource(SurfaceSlots::default());
     world.insert_resource(PunctualLights::default());
@@ -38,6 +41,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
             extract_surfaces,
             extract_meshes,
             extract_instances,
+            extract_resting_meshes,
             extract_lights,
             derive_requirements,
         )

@@ -3,6 +3,7 @@
 mod film_pass;
 mod path;
 mod scene_view;
+mod share;
 mod vertex;
 
 pub use film_pass::{IntegrateStatus, render_film};

@@ -1,7 +1,10 @@
 //! The surface where a ray hit it, in render space.
 
+use super::resting::point_error;
+use super::top::Joined;
 use super::{Hit, MeshTree, SceneGeometry};
-use crate::extract::Geometry;
+use crate::description::TriangleMesh;
+use crate::extract::{Geometry, Instance};
 use crate::math::{Frame, MotionTransform, Ray};
 use crate::shape::{LocalSurface, rounding_error};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
@@ -54,6 +57,12 @@ impl SceneGeometry<'_> {
     /// The surface where `ray` hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let instance = &self.instances[hit.instance as usize];
+        if let (Some(joined), Geometry::Mesh(mesh)) = (&self.top.joined, instance.geometry)
+            && let Some(first) = joined.members.first_triangle(hit.instance)
+        {
+            let mesh = &self.meshes[mesh as usize].mesh;
+            return joined.surface(mesh, first, hit, instance);
+        }
         let surface = |forward: &DAffine3, inverse: &DAffine3| {
             let local = match instance.geometry {
                 Geometry::Primitive(primitive) => {
@@ -61,7 +70,8 @@ impl SceneGeometry<'_> {
                     primitive.surface(p, hit.primitive, instance.needs_uv)
                 }
                 Geometry::Mesh(mesh) => {
-                    self.meshes[mesh as usize].surface(hit.primitive, hit.weights)
+                    let mesh = &self.meshes[mesh as usize];
+                    mesh.surface(hit.primitive, hit.weights, instance.needs_uv)
                 }
             };
             SurfacePoint::new(&local, forward, inverse)
@@ -84,38 +94,101 @@ impl SceneGeometry<'_> {
     }
 }
 
-impl MeshTree {
-    /// The surface of a triangle at these weights of its second and third corner.
-    pub fn surface(&self, triangle: u32, weights: DVec2) -> LocalSurface {
-        let corners = self.corners(triangle).map(Vec3::as_dvec3);
-        let [a, b, c] = corners;
-        let barycentric = [1.0 - weights.x - weights.y, weights.x, weights.y];
-        // Both edges in units of the longest component: their product neither under- nor overflows.
-        let (e1, e2) = (b - a, c - a);
-        let size = e1.abs().max(e2.abs()).max_element();
-        let ng = (e1 / size).cross(e2 / size);
-        let indices = self.mesh.triangles[triangle as usize];
-        let ns = if self.mesh.normals.is_empty() {
-            ng
-        } else {
-            let sum: DVec3 = (0..3)
-                .map(|k| self.mesh.normals[indices[k] as usize].as_dvec3() * barycentric[k])
-                .sum();
-            // Opposite normals may cancel.
-            if sum.length_squared() > 0.0 { sum } else { ng }
+impl Joined {
+    /// The surface of a triangle of an instance whose first triangle in the shared tree is `first`.
+    fn surface(
+        &self,
+        mesh: &TriangleMesh,
+        first: u32,
+        hit: &Hit,
+        instance: &Instance,
+    ) -> SurfacePoint {
+        let corners = self.tree.corners(first + hit.primitive);
+        let facet = Facet::new(corners, hit.weights);
+        let MotionTransform::Static { forward, inverse } = &instance.motion else {
+            unreachable!("what moves is not joined");
         };
-        let uvs = if self.mesh.uvs.is_empty() {
+        // A mirroring map turns the order of the corners: the outside stays outside.
+        let outward = if forward.matrix3.determinant() < 0.0 { -facet.ng } else { facet.ng };
+        let ng = outward.normalize().as_vec3();
+        let ns = interpolated_normal(mesh, hit.primitive, hit.weights)
+            .map(|n| (inverse.matrix3.transpose() * n).normalize())
+            .filter(|n| n.is_finite())
+            .map_or(ng, DVec3::as_vec3);
+        let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
+        let (uv, dpdu) = if instance.needs_uv {
+            facet.parameters(mesh, hit.primitive, hit.weights)
+        } else {
+            (Vec2::ZERO, DVec3::ZERO)
+        };
+        let p = facet.p + self.shift;
+        let p_error = point_error(corners, self.shift, p);
+        SurfacePoint { p, p_error, ng, ns, uv, dpdu: dpdu.as_vec3() }
+    }
+}
+
+impl MeshTree {
+    /// The surface of a triangle at these weights of its second and third corner. Texture coordinates
+    /// are left out, and uv is 0, unless `needs_uv`.
+    pub fn surface(&self, triangle: u32, weights: DVec2, needs_uv: bool) -> LocalSurface {
+        let facet = Facet::new(self.corners(triangle), weights);
+        let ns = interpolated_normal(&self.mesh, triangle, weights).unwrap_or(facet.ng);
+        let (uv, dpdu) = if needs_uv {
+            facet.parameters(&self.mesh, triangle, weights)
+        } else {
+            (Vec2::ZERO, DVec3::ZERO)
+        };
+        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu }
+    }
+}
+
+/// A point of a triangle, with what follows from the corners alone.
+struct Facet {
+    p: DVec3,
+    /// Normal of any positive length.
+    ng: DVec3,
+    e1: DVec3,
+    e2: DVec3,
+}
+
+impl Facet {
+    #[inline]
+    fn new(corners: [Vec3; 3], weights: DVec2) -> Self {
+        let [a, b, c] = corners.map(Vec3::as_dvec3);
+        let (e1, e2) = (b - a, c - a);
+        // The product of two numbers of f32 neither under- nor overflows in f64.
+        let ng = e1.cross(e2);
+        let p = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
+        Self { p, ng, e1, e2 }
+    }
+
+    /// Texture coordinates, and the direction in which u grows.
+    fn parameters(&self, mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> (Vec2, DVec3) {
+        let uvs = if mesh.uvs.is_empty() {
             [Vec2::ZERO, Vec2::X, Vec2::ONE]
         } else {
-            indices.map(|k| self.mesh.uvs[k as usize])
+            mesh.triangles[triangle as usize].map(|k| mesh.uvs[k as usize])
         };
-        let uv = (0..3).map(|k| uvs[k].as_dvec2() * barycentric[k]).sum::<DVec2>();
-        let (d1, d2) = ((uvs[1] - uvs[0]).as_dvec2(), (uvs[2] - uvs[0]).as_dvec2());
+        let [a, b, c] = uvs.map(Vec2::as_dvec2);
+        let uv = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
+        let (d1, d2) = (b - a, c - a);
         let det = d1.perp_dot(d2);
+        let (e1, e2) = (self.e1, self.e2);
         let dpdu = if det == 0.0 { e1 } else { (e1 * d2.y - e2 * d1.y) * det.signum() };
-        let p = a * barycentric[0] + b * barycentric[1] + c * barycentric[2];
-        LocalSurface { p, ng, ns, uv: uv.as_vec2(), dpdu }
+        (uv.as_vec2(), dpdu)
     }
+}
+
+/// The normal between those of the corners, of any length; `None` where the mesh has none, or where
+/// opposite normals cancel.
+#[inline]
+fn interpolated_normal(mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> Option<DVec3> {
+    if mesh.normals.is_empty() {
+        return None;
+    }
+    let [a, b, c] = mesh.triangles[triangle as usize].map(|k| mesh.normals[k as usize].as_dvec3());
+    let sum = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
+    (sum.length_squared() > 0.0).then_some(sum)
 }
 
 #[cfg(test)]
@@ -165,7 +238,7 @@ mod tests {
             let scene = SceneGeometry { instances: &instances, meshes: &meshes, top: &top };
             let root = s.one(17).sqrt();
             let weights = DVec2::new(f64::from(1.0 - root), f64::from(root * s.one(18)));
-            let surface = SurfacePoint::new(&tree.surface(0, weights), &forward, &inverse);
+            let surface = SurfacePoint::new(&tree.surface(0, weights, false), &forward, &inverse);
             for k in 0..4 {
                 let d = (three(20 + 3 * k)).normalize();
                 let o = offset_ray_origin(surface.p, surface.p_error, surface.ng, d);

@@ -263,6 +263,8 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
         ("samples", f64::from(render.samples), &limits::SAMPLES),
         ("max_depth", f64::from(render.max_depth), &limits::DEPTH),
         ("roulette_depth", f64::from(render.roulette_depth), &limits::ROULETTE),
+        ("roulette_gain", f64::from(render.roulette_gain), &limits::ROULETTE_GAIN),
+        ("share", f64::from(render.share), &limits::GROUP),
         ("clamp_indirect", f64::from(render.clamp_indirect.unwrap_or(1.0)), &limits::POSITIVE),
         ("motion_tolerance", render.motion_tolerance, &limits::TOLERANCE),
         ("exposure", f64::from(render.exposure), &limits::STOPS),

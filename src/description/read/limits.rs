@@ -81,6 +81,11 @@ pub(super) const SAMPLES: Limits = closed(1.0, 1e9, "samples");
 pub(super) const DEPTH: Limits = closed(1.0, 1e6, "interactions");
 /// Interactions before Russian roulette.
 pub(super) const ROULETTE: Limits = closed(0.0, 1e6, "interactions");
+/// What the throughput is multiplied by for roulette.
+pub(super) const ROULETTE_GAIN: Limits =
+    Limits { min: 0.0, max: 1e9, open_min: true, open_max: false, unit: "" };
+/// Side of the groups of pixels which share paths.
+pub(super) const GROUP: Limits = closed(1.0, 4.0, "pixels");
 /// Anything above zero.
 pub(super) const POSITIVE: Limits =
     Limits { min: 0.0, max: 1e18, open_min: true, open_max: false, unit: "" };

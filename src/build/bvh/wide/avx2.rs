@@ -5,6 +5,7 @@
 #![expect(unsafe_code, reason = "vector instructions, used only where the processor has them")]
 
 use super::WideTree;
+use super::boxes::{BoxTree, visit_boxes};
 use super::node::{BLOCK, Block, Child, Node};
 use super::ray::BoxRay;
 use super::traverse::{BlockHits, Distances, Lanes, TriangleHit, any_hit, closest_hit};
@@ -54,6 +55,18 @@ impl Avx2 {
         // SAFETY: a value of this type exists only where the features were detected.
         unsafe { any_hit_avx2::<STACK>(tree, ray, t_max) }
     }
+
+    #[inline]
+    pub(super) fn visit_boxes<const STACK: usize>(
+        self,
+        tree: &BoxTree,
+        prepared: &BoxRay,
+        t_max: f64,
+        visit: impl FnMut(u32, f64) -> f64,
+    ) {
+        // SAFETY: a value of this type exists only where the features were detected.
+        unsafe { visit_boxes_avx2::<STACK>(tree, prepared, t_max, visit) }
+    }
 }
 
 #[target_feature(enable = "avx2,bmi1,popcnt")]
@@ -70,7 +83,17 @@ fn any_hit_avx2<const STACK: usize>(tree: &WideTree, ray: &LocalRay, t_max: f64)
     any_hit::<Vectors, STACK>(tree, ray, t_max)
 }
 
-/// The vector tests. Private: they are instantiated only by the two functions above, which have the
+#[target_feature(enable = "avx2,bmi1,popcnt")]
+fn visit_boxes_avx2<const STACK: usize>(
+    tree: &BoxTree,
+    prepared: &BoxRay,
+    t_max: f64,
+    visit: impl FnMut(u32, f64) -> f64,
+) {
+    visit_boxes::<Vectors, STACK>(tree, prepared, t_max, visit);
+}
+
+/// The vector tests. Private: they are instantiated only by the three functions above, which have the
 /// features and into which they are inlined.
 struct Vectors;
 
@@ -97,20 +120,20 @@ struct TriangleLanes {
 
 #[inline(always)]
 fn lanes_of(v: [f32; 3]) -> [__m256; 3] {
-    // SAFETY: runs only inside the two functions with the features.
+    // SAFETY: runs only inside the three functions with the features.
     unsafe { [_mm256_set1_ps(v[0]), _mm256_set1_ps(v[1]), _mm256_set1_ps(v[2])] }
 }
 
 #[inline(always)]
 fn wide_lanes_of(v: [f64; 3]) -> [__m256d; 3] {
-    // SAFETY: runs only inside the two functions with the features.
+    // SAFETY: runs only inside the three functions with the features.
     unsafe { [_mm256_set1_pd(v[0]), _mm256_set1_pd(v[1]), _mm256_set1_pd(v[2])] }
 }
 
 /// Corners as seen from the origin of the ray, along one axis.
 #[inline(always)]
 fn from_origin(row: &[f32; BLOCK], o: __m256d) -> __m256d {
-    // SAFETY: runs only inside the two functions with the features; the load is unaligned.
+    // SAFETY: runs only inside the three functions with the features; the load is unaligned.
     unsafe { _mm256_sub_pd(_mm256_cvtps_pd(_mm_loadu_ps(row.as_ptr())), o) }
 }
 
@@ -120,7 +143,7 @@ fn sheared(ray: &TriangleLanes, corner: &[[f32; BLOCK]; 3]) -> (__m256d, __m256d
     let [kx, ky, kz] = ray.axes;
     let z = from_origin(&corner[kz], ray.o[2]);
     let (x, y) = (from_origin(&corner[kx], ray.o[0]), from_origin(&corner[ky], ray.o[1]));
-    // SAFETY: runs only inside the two functions with the features.
+    // SAFETY: runs only inside the three functions with the features.
     unsafe {
         let x = _mm256_sub_pd(x, _mm256_mul_pd(ray.shear[0], z));
         let y = _mm256_sub_pd(y, _mm256_mul_pd(ray.shear[1], z));
@@ -131,7 +154,7 @@ fn sheared(ray: &TriangleLanes, corner: &[[f32; BLOCK]; 3]) -> (__m256d, __m256d
 /// `p·q − r·s`, rounded as written: a fused product would open the seams.
 #[inline(always)]
 fn edge(p: __m256d, q: __m256d, r: __m256d, s: __m256d) -> __m256d {
-    // SAFETY: runs only inside the two functions with the features.
+    // SAFETY: runs only inside the three functions with the features.
     unsafe { _mm256_sub_pd(_mm256_mul_pd(p, q), _mm256_mul_pd(r, s)) }
 }
 
@@ -159,7 +182,7 @@ impl Lanes for Vectors {
 
     #[inline(always)]
     fn enter(ray: &BoxLanes, node: &Node, end: f32, distances: &mut Distances) -> u32 {
-        // SAFETY: runs only inside the two functions with the features. The rows of planes are 32
+        // SAFETY: runs only inside the three functions with the features. The rows of planes are 32
         // bytes long in a type aligned to 64, and distances are aligned to 32.
         unsafe {
             let mut near = _mm256_setzero_ps();
@@ -187,7 +210,7 @@ impl Lanes for Vectors {
 
     #[inline(always)]
     fn hit(ray: &TriangleLanes, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32 {
-        // SAFETY: runs only inside the two functions with the features. The rows of
+        // SAFETY: runs only inside the three functions with the features. The rows of
         // the hits are 32 bytes long in a type aligned to 32.
         unsafe {
             let (ax, ay, az) = sheared(ray, &block.corners[0]);

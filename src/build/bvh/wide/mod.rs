@@ -21,6 +21,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod binary;
+mod boxes;
 mod collapse;
 #[cfg(test)]
 mod meshes;
@@ -31,6 +32,7 @@ mod ray;
 mod tests;
 mod traverse;
 
+pub use boxes::BoxTree;
 pub use traverse::TriangleHit;
 
 use crate::description::TriangleMesh;

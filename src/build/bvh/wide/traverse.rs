@@ -116,26 +116,26 @@ impl Lanes for Portable {
 
 /// A child on the stack: its distance in the upper half, so that keys sort by distance (which is not
 /// negative, and the bits of such numbers are in their order).
-type Key = u64;
+pub(super) type Key = u64;
 
 #[inline(always)]
-fn key(distance: f32, child: Child) -> Key {
+pub(super) fn key(distance: f32, child: Child) -> Key {
     u64::from(distance.to_bits()) << 32 | u64::from(child.0)
 }
 
 #[inline(always)]
-fn child_of(key: Key) -> Child {
+pub(super) fn child_of(key: Key) -> Child {
     Child(key as u32)
 }
 
 #[inline(always)]
-fn distance_of(key: Key) -> f32 {
+pub(super) fn distance_of(key: Key) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 
 /// The lanes of a mask, from the lowest.
 #[inline(always)]
-fn take_lane(mask: &mut u32) -> usize {
+pub(super) fn take_lane(mask: &mut u32) -> usize {
     let lane = mask.trailing_zeros() as usize;
     *mask &= *mask - 1;
     lane % WIDTH
