@@ -42,7 +42,7 @@ fn time_per_ray(mut simulation: Simulation, rays: &[Ray], repetitions: usize) ->
 
 /// Instances of a ball, and triangles of one mesh, in the cube `[−1, 1]³`.
 pub fn run(options: &Options, report: &mut Report) {
-    let (count, repetitions) = if options.quick { (20_000, 3) } else { (100_000, 5) };
+    let (count, repetitions) = if options.quick { (100_000, 3) } else { (400_000, 5) };
     let rays = common::rays(count);
     report.section("growth: nanoseconds per ray at equal depth complexity");
     let mut rows = |what: &str, counts: [usize; 3], world: &dyn Fn(usize) -> Simulation| {

@@ -23,6 +23,7 @@ mod samples;
 
 #[path = "../common/mod.rs"]
 mod common;
+#[expect(dead_code, reason = "shared with tests, which need more of it")]
 #[path = "../../src/build/bvh/wide/meshes.rs"]
 mod meshes;
 

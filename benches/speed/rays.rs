@@ -154,7 +154,7 @@ fn primary(side: u32, eye: Vec3, target: Vec3) -> Vec<Segment> {
 
 /// Measures both scenes.
 pub fn run(options: &Options, report: &mut Report) {
-    let (side, repetitions) = if options.quick { (256, 3) } else { (512, 7) };
+    let (side, repetitions) = if options.quick { (512, 3) } else { (1024, 7) };
     let v = Vec3::new;
     let scenes = [
         (

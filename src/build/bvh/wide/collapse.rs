@@ -172,14 +172,13 @@ pub(super) fn collapse(
     let Some(root) = nodes.first() else { return emitter.tree };
     let mut plans = vec![Plan::default(); nodes.len()];
     plan(nodes, &mut plans);
-    emitter.tree.blocks.reserve(references.len() / 3);
+    emitter.tree.blocks = super::pages::vec_on_large_pages(references.len() / 2);
+    emitter.tree.nodes = super::pages::vec_on_large_pages(references.len() / 8);
     if root.count as usize <= WIDE_LEAF {
         emitter.tree.root = emitter.leaf(root);
     } else {
         emitter.tree.root = Child::node(0);
         emitter.tree.stack = emitter.node(nodes, &plans);
     }
-    emitter.tree.nodes.shrink_to_fit();
-    emitter.tree.blocks.shrink_to_fit();
     emitter.tree
 }

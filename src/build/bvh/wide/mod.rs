@@ -25,6 +25,7 @@ mod collapse;
 #[cfg(test)]
 mod meshes;
 mod node;
+mod pages;
 mod presplit;
 mod ray;
 #[cfg(test)]
