@@ -143,6 +143,10 @@ impl Emitter<'_> {
         self.tree.nodes.push(Node::EMPTY);
         let mut slots = Slots::default();
         slots.divide(nodes, plans, WIDTH);
+        let area = |slot: &Option<(&[BinaryNode], &[Plan])>| {
+            slot.map_or(f32::INFINITY, |(nodes, _)| nodes[0].bounds.area())
+        };
+        slots.list[..slots.count].sort_by(|a, b| area(a).total_cmp(&area(b)));
         // First all leaves, so that those of a node are neighbours; then what is below.
         for (slot, (nodes, plans)) in slots.list.iter().flatten().enumerate() {
             self.tree.nodes[index].set_box(slot, &nodes[0].bounds);
