@@ -4,7 +4,10 @@
 //! touch needs a walk through the page tables, which a virtual machine walks twice. Linux gives pages
 //! of 2 MiB to memory for which a program asks for them (`transparent_hugepage`, see madvise(2)).
 
-#![cfg_attr(target_os = "linux", expect(unsafe_code, reason = "a system call that takes an address"))]
+#![cfg_attr(
+    target_os = "linux",
+    expect(unsafe_code, reason = "a system call that takes an address")
+)]
 
 /// An empty vector with room for `capacity` elements, on large pages where the system has them.
 ///
@@ -23,5 +26,12 @@ pub(super) fn vec_on_large_pages<T>(capacity: usize) -> Vec<T> {
             let _ = unsafe { madvise(address, end - begin, Advice::LinuxHugepage) };
         }
     }
+    vec
+}
+
+/// A vector of so many equal elements, on large pages where the system has them.
+pub(super) fn filled_on_large_pages<T: Clone>(len: usize, value: T) -> Vec<T> {
+    let mut vec = vec_on_large_pages(len);
+    vec.resize(len, value);
     vec
 }
