@@ -18,17 +18,14 @@ pub struct TriangleTest {
 
 impl TriangleTest {
     /// Prepares a ray.
+    #[inline]
     pub fn new(ray: &LocalRay) -> Self {
         let size = ray.d.abs();
-        let z = if size.x > size.y && size.x > size.z {
-            0
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let d = ray.d;
+        // Without branches, which the directions of bounced rays would mislead.
+        let x_longest = (size.x > size.y) & (size.x > size.z);
+        let z = usize::from(!x_longest) * (2 - usize::from(size.y > size.z));
+        let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
+        let d = ray.d.to_array();
         Self { o: ray.o, axes: [x, y, z], shear: DVec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]) }
     }
 

@@ -176,7 +176,8 @@ impl Lanes for Vectors {
     #[inline(always)]
     fn prepare_triangles(test: &TriangleTest) -> TriangleLanes {
         let axes = test.axes;
-        let o = [test.o[axes[0]], test.o[axes[1]], test.o[axes[2]]];
+        let o = test.o.to_array();
+        let o = [o[axes[0]], o[axes[1]], o[axes[2]]];
         TriangleLanes { o: wide_lanes_of(o), shear: wide_lanes_of(test.shear.to_array()), axes }
     }
 

@@ -26,6 +26,7 @@ mod collapse;
 #[cfg(test)]
 mod meshes;
 mod node;
+mod pages;
 mod presplit;
 mod ray;
 #[cfg(test)]
@@ -97,7 +98,7 @@ impl WideTree {
     pub fn build(mesh: &TriangleMesh, split_budget: f32) -> Self {
         let mut references = presplit::references(mesh, split_budget);
         let nodes = binary::build(&mut references);
-        collapse::collapse(mesh, &references, &nodes)
+        collapse::collapse(mesh, references, &nodes)
     }
 
     /// Follows moved corners: `mesh` has the triangles of the build at new places. The tree keeps its
