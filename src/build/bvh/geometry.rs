@@ -150,7 +150,7 @@ fn whole(ray: &Ray) -> LocalRay {
 fn to_instance(instance: &Instance, ray: &Ray) -> LocalRay {
     match &instance.motion {
         MotionTransform::Static { inverse, .. } => local_ray(inverse, ray),
-        moving @ MotionTransform::Moving { .. } => local_ray(&moving.inverse_at(ray.time), ray),
+        moving => local_ray(&moving.inverse_at(ray.time), ray),
     }
 }
 

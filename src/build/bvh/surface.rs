@@ -78,7 +78,7 @@ impl SceneGeometry<'_> {
         };
         match &instance.motion {
             MotionTransform::Static { forward, inverse } => surface(forward, inverse),
-            moving @ MotionTransform::Moving { .. } => {
+            moving => {
                 let (forward, inverse) = moving.both_at(ray.time);
                 surface(&forward, &inverse)
             }
