@@ -11,4 +11,4 @@ pub use geometry::{
 };
 pub use surface::SurfacePoint;
 pub use tree::Bvh;
-pub use wide::{TriangleHit, WideTree};
+pub use wide::{MovingTree, TriangleHit, WideTree};

@@ -24,6 +24,7 @@ mod binary;
 mod collapse;
 #[cfg(test)]
 mod meshes;
+mod moving;
 mod node;
 mod pages;
 mod presplit;
@@ -32,6 +33,7 @@ mod ray;
 mod tests;
 mod traverse;
 
+pub use moving::MovingTree;
 pub use traverse::TriangleHit;
 
 use crate::description::TriangleMesh;
@@ -41,7 +43,7 @@ use binary::DEEPEST;
 use glam::Vec3;
 use node::{BLOCK, Block, Child, Node, WIDTH};
 use rayon::prelude::*;
-use traverse::{Portable, any_hit, closest_hit};
+use traverse::{BlockHits, Lanes, Nodes, Portable, any_hit, closest_hit};
 
 /// Room on the stack that is enough for all but odd trees.
 const SHORT_STACK: usize = 96;
@@ -83,6 +85,38 @@ impl Instructions {
         }
         Self::Portable
     }
+
+    /// The nearest hit in a tree whose traversal takes `stack` places.
+    #[inline]
+    fn closest_hit<N: Nodes>(
+        self,
+        tree: &N,
+        stack: usize,
+        ray: &LocalRay,
+        t_max: f64,
+    ) -> Option<TriangleHit> {
+        match (self, stack <= SHORT_STACK) {
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), true) => avx2.closest_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), false) => avx2.closest_hit::<N, LONG_STACK>(tree, ray, t_max),
+            (Self::Portable, true) => closest_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
+            (Self::Portable, false) => closest_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
+        }
+    }
+
+    /// Whether anything is hit in a tree whose traversal takes `stack` places.
+    #[inline]
+    fn any_hit<N: Nodes>(self, tree: &N, stack: usize, ray: &LocalRay, t_max: f64) -> bool {
+        match (self, stack <= SHORT_STACK) {
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), true) => avx2.any_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), false) => avx2.any_hit::<N, LONG_STACK>(tree, ray, t_max),
+            (Self::Portable, true) => any_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
+            (Self::Portable, false) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
+        }
+    }
 }
 
 impl WideTree {
@@ -96,7 +130,7 @@ impl WideTree {
     pub fn build(mesh: &TriangleMesh, split_budget: f32) -> Self {
         let mut references = presplit::references(mesh, split_budget);
         let nodes = binary::build(&mut references);
-        collapse::collapse(mesh, references, &nodes)
+        collapse::collapse(&|triangle| corners(mesh, triangle), references, &nodes)
     }
 
     /// Follows moved corners: `mesh` has the triangles of the build at new places. The tree keeps its
@@ -175,29 +209,53 @@ impl WideTree {
         ray: &LocalRay,
         t_max: f64,
     ) -> Option<TriangleHit> {
-        match (instructions, self.stack <= SHORT_STACK) {
-            #[cfg(target_arch = "x86_64")]
-            (Instructions::Avx2(avx2), true) => avx2.closest_hit::<SHORT_STACK>(self, ray, t_max),
-            #[cfg(target_arch = "x86_64")]
-            (Instructions::Avx2(avx2), false) => avx2.closest_hit::<LONG_STACK>(self, ray, t_max),
-            (Instructions::Portable, true) => {
-                closest_hit::<Portable, SHORT_STACK>(self, ray, t_max)
-            }
-            (Instructions::Portable, false) => {
-                closest_hit::<Portable, LONG_STACK>(self, ray, t_max)
-            }
-        }
+        instructions.closest_hit(self, self.stack, ray, t_max)
     }
 
     #[inline]
     fn any_hit_by(&self, instructions: Instructions, ray: &LocalRay, t_max: f64) -> bool {
-        match (instructions, self.stack <= SHORT_STACK) {
-            #[cfg(target_arch = "x86_64")]
-            (Instructions::Avx2(avx2), true) => avx2.any_hit::<SHORT_STACK>(self, ray, t_max),
-            #[cfg(target_arch = "x86_64")]
-            (Instructions::Avx2(avx2), false) => avx2.any_hit::<LONG_STACK>(self, ray, t_max),
-            (Instructions::Portable, true) => any_hit::<Portable, SHORT_STACK>(self, ray, t_max),
-            (Instructions::Portable, false) => any_hit::<Portable, LONG_STACK>(self, ray, t_max),
+        instructions.any_hit(self, self.stack, ray, t_max)
+    }
+}
+
+impl Nodes for WideTree {
+    #[inline(always)]
+    fn root(&self) -> Child {
+        self.root
+    }
+
+    #[inline(always)]
+    fn node<'a>(&'a self, index: usize, _: &'a mut Node) -> &'a Node {
+        &self.nodes[index]
+    }
+
+    #[inline(always)]
+    fn hit<L: Lanes>(
+        &self,
+        block: usize,
+        ray: &L::Triangles,
+        t_max: f64,
+        hits: &mut BlockHits,
+    ) -> u32 {
+        L::hit(ray, &self.blocks[block], t_max, hits)
+    }
+
+    #[inline(always)]
+    fn triangle(&self, block: usize, lane: usize) -> u32 {
+        self.blocks[block].triangles[lane]
+    }
+
+    #[inline(always)]
+    fn triangle_bounds(&self, block: usize, lane: usize) -> Aabb {
+        Aabb::from_points(self.blocks[block].get(lane))
+    }
+
+    #[inline(always)]
+    fn place(&self, child: Child) -> (*const i8, usize) {
+        if child.is_leaf() {
+            (self.blocks.as_ptr().wrapping_add(child.blocks().start).cast(), 3)
+        } else {
+            (self.nodes.as_ptr().wrapping_add(child.index()).cast(), 4)
         }
     }
 }

@@ -24,7 +24,7 @@ fn nearest_of_all(mesh: &TriangleMesh, ray: &LocalRay, t_max: f64) -> Option<Tri
         let end = best.map_or(t_max, |best| best.t);
         let corners = corners(mesh, triangle);
         if let Some((t, weights)) = test.intersect(corners, end)
-            && boxes.reaches(corners, t)
+            && boxes.reaches(&Aabb::from_points(corners), t)
         {
             best = Some(TriangleHit { t, triangle, weights });
         }
@@ -47,7 +47,7 @@ fn nearest_by_binary_tree(
         match test.intersect(corners, end) {
             Some((t, weights))
                 if best.is_none_or(|best| (t, triangle) < (best.t, best.triangle))
-                    && boxes.reaches(corners, t) =>
+                    && boxes.reaches(&Aabb::from_points(corners), t) =>
             {
                 best = Some(TriangleHit { t, triangle, weights });
                 t.next_up()
@@ -93,7 +93,7 @@ fn ray(mesh: &TriangleMesh, bounds: &Aabb, number: u64) -> (LocalRay, f64) {
     (LocalRay { o, d: d * stretch }, end)
 }
 
-fn all_instructions() -> Vec<Instructions> {
+pub(super) fn all_instructions() -> Vec<Instructions> {
     let best = Instructions::detect();
     if matches!(best, Instructions::Portable) {
         vec![best]
