@@ -1,17 +1,16 @@
 //! Two levels: a tree per mesh in the mesh's own space, and a tree over the instances of a frame.
 
 use super::{Bvh, WideTree};
-use crate::description::TriangleMesh;
+use crate::description::{BvhQuality, TriangleMesh};
 use crate::extract::{Geometry, Instance, Instances, Meshes};
 use crate::math::{Aabb, MotionTransform, Ray};
 use crate::shape::LocalRay;
+use crate::world::Settings;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Share of references that cutting large triangles may add to the tree of a mesh.
-const SPLIT_BUDGET: f32 = 0.1;
 /// Most instances in a leaf of the top level: a test of one costs a change of space.
 const INSTANCES_PER_LEAF: usize = 1;
 
@@ -21,13 +20,14 @@ pub struct MeshTree {
     /// The triangles.
     pub mesh: Arc<TriangleMesh>,
     tree: WideTree,
+    quality: BvhQuality,
 }
 
 impl MeshTree {
     /// Builds the tree of a mesh.
-    pub fn build(mesh: Arc<TriangleMesh>) -> Self {
-        let tree = WideTree::build(&mesh, SPLIT_BUDGET);
-        Self { mesh, tree }
+    pub fn build(mesh: Arc<TriangleMesh>, quality: BvhQuality) -> Self {
+        let tree = WideTree::build(&mesh, quality);
+        Self { mesh, tree, quality }
     }
 
     /// The corners of a triangle.
@@ -46,21 +46,30 @@ pub struct MeshTrees {
     pub built: usize,
 }
 
-/// Builds the trees of new meshes and drops those of removed ones.
-pub fn rebuild_mesh_trees(meshes: Res<Meshes>, mut trees: ResMut<MeshTrees>) {
-    if !meshes.is_changed() {
+/// Builds the trees of new meshes and drops those of removed ones; builds all anew for another quality.
+pub fn rebuild_mesh_trees(
+    meshes: Res<Meshes>,
+    settings: Res<Settings>,
+    mut trees: ResMut<MeshTrees>,
+) {
+    let quality = settings.0.bvh;
+    if !meshes.is_changed() && trees.list.iter().all(|tree| tree.quality == quality) {
         if trees.built != 0 {
             trees.bypass_change_detection().built = 0;
         }
         return;
     }
     let old = std::mem::take(&mut trees.list);
-    let kept = |mesh: &Arc<TriangleMesh>| old.iter().find(|tree| Arc::ptr_eq(&tree.mesh, mesh));
+    let kept = |mesh: &Arc<TriangleMesh>| {
+        old.iter().find(|tree| tree.quality == quality && Arc::ptr_eq(&tree.mesh, mesh))
+    };
     trees.built = meshes.list.iter().filter(|mesh| kept(mesh).is_none()).count();
     trees.list = meshes
         .list
         .par_iter()
-        .map(|mesh| kept(mesh).cloned().unwrap_or_else(|| Arc::new(MeshTree::build(mesh.clone()))))
+        .map(|mesh| {
+            kept(mesh).cloned().unwrap_or_else(|| Arc::new(MeshTree::build(mesh.clone(), quality)))
+        })
         .collect();
 }
 

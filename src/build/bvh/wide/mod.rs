@@ -29,6 +29,7 @@ mod node;
 mod pages;
 mod presplit;
 mod ray;
+mod reinsert;
 #[cfg(test)]
 mod tests;
 mod traverse;
@@ -36,10 +37,10 @@ mod traverse;
 pub use moving::MovingTree;
 pub use traverse::TriangleHit;
 
-use crate::description::TriangleMesh;
+use crate::description::{BvhQuality, TriangleMesh};
 use crate::math::Aabb;
 use crate::shape::LocalRay;
-use binary::DEEPEST;
+use binary::{DEEPEST, Search};
 use glam::Vec3;
 use node::{BLOCK, Block, Child, Node, WIDTH};
 use rayon::prelude::*;
@@ -49,6 +50,17 @@ use traverse::{BlockHits, Lanes, Nodes, Portable, any_hit, closest_hit};
 const SHORT_STACK: usize = 96;
 /// Room that is enough for any tree: every level leaves all children but one on the stack.
 const LONG_STACK: usize = DEEPEST * (WIDTH - 1) + 1;
+
+/// The share of references that may be added by cutting large triangles into parts.
+///
+/// A tenth costs a tenth of the memory and a fifth of the build; rays among long triangles which do not
+/// follow the axes became 1.6 times as fast, those over even hills 1.05 times slower.
+fn split_budget(quality: BvhQuality) -> f32 {
+    match quality {
+        BvhQuality::Fast => 0.0,
+        BvhQuality::Balanced | BvhQuality::Best => 0.1,
+    }
+}
 
 /// The tree of a mesh.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,13 +135,19 @@ impl WideTree {
     /// Builds the tree of `mesh`, in parallel. Triangles with a corner that is not finite are left
     /// out.
     ///
-    /// `split_budget` is the share of references that may be added by cutting large triangles into
-    /// parts. 0.1 costs a tenth of the memory and a fifth of the build; rays among long triangles
-    /// which do not follow the axes became 1.6 times as fast, those over even hills 1.05 times slower.
-    /// 0 suits meshes that will be refitted.
-    pub fn build(mesh: &TriangleMesh, split_budget: f32) -> Self {
-        let mut references = presplit::references(mesh, split_budget);
-        let nodes = binary::build(&mut references);
+    /// A tree that will be refitted is best built [`BvhQuality::Fast`], without cut triangles.
+    pub fn build(mesh: &TriangleMesh, quality: BvhQuality) -> Self {
+        Self::build_with_budget(mesh, quality, split_budget(quality))
+    }
+
+    /// The same with a share of references that may be added by cutting large triangles.
+    fn build_with_budget(mesh: &TriangleMesh, quality: BvhQuality, budget: f32) -> Self {
+        let mut references = presplit::references(mesh, budget);
+        let search = if quality == BvhQuality::Fast { Search::Coarse } else { Search::Fine };
+        let mut nodes = binary::build_by(&mut references, search);
+        if quality == BvhQuality::Best {
+            reinsert::optimize(&mut references, &mut nodes);
+        }
         collapse::collapse(&|triangle| corners(mesh, triangle), references, &nodes)
     }
 
@@ -186,8 +204,8 @@ impl WideTree {
     ///
     /// 61 bytes per reference were measured on hills and in rooms of a million triangles; it holds
     /// within a fifth for meshes of thousands of triangles and more.
-    pub fn forecast(triangles: usize, split_budget: f32) -> usize {
-        (triangles as f64 * 61.0 * (1.0 + f64::from(split_budget))) as usize
+    pub fn forecast(triangles: usize, quality: BvhQuality) -> usize {
+        (triangles as f64 * 61.0 * (1.0 + f64::from(split_budget(quality)))) as usize
     }
 
     /// The nearest hit with `0 < t < t_max`; among equal ones that of the lowest triangle.

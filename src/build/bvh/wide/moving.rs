@@ -335,7 +335,7 @@ mod tests {
     use super::super::ray::BoxRay;
     use super::super::tests::all_instructions;
     use super::*;
-    use crate::description::TriangleMesh;
+    use crate::description::{BvhQuality, TriangleMesh};
     use crate::shape::TriangleTest;
     use glam::Quat;
 
@@ -472,7 +472,7 @@ mod tests {
             triangles: raw.triangles.clone(),
             ..Default::default()
         };
-        let rest = WideTree::build(&mesh, 0.0);
+        let rest = WideTree::build(&mesh, BvhQuality::Fast);
         for keys in [vec![raw.positions.clone()], vec![raw.positions.clone(); 3]] {
             let tree = tree_of(&raw, &keys);
             for number in 0..RAYS {
