@@ -11,7 +11,7 @@ use crate::report::Report;
 use crate::{Options, mesh_of};
 use glam::{DVec3, Vec3, Vec3A};
 use kinora::build::bvh::WideTree;
-use kinora::description::TriangleMesh;
+use kinora::description::{BvhQuality, TriangleMesh};
 use kinora::shape::LocalRay;
 use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::{Ray, RayHit};
@@ -55,7 +55,7 @@ pub fn compressed_tree(mesh: &TriangleMesh) -> (CwBvh, Vec<Triangle>) {
 
 impl Trees {
     fn build(mesh: TriangleMesh) -> Self {
-        let wide = WideTree::build(&mesh, 0.1);
+        let wide = WideTree::build(&mesh, BvhQuality::Balanced);
         let (compressed, triangles) = compressed_tree(&mesh);
         Self { mesh, wide, compressed, triangles }
     }
@@ -152,28 +152,50 @@ fn primary(side: u32, eye: Vec3, target: Vec3) -> Vec<Segment> {
     (0..side * side).map(pixel).collect()
 }
 
+/// A scene: its name, its mesh, from where and to where the camera looks, and where the light is.
+type Scene = (&'static str, RawMesh, Vec3, Vec3, Vec3);
+
+/// The two scenes.
+fn scenes() -> [Scene; 2] {
+    let v = Vec3::new;
+    let terrain = RawMesh::terrain(447, 810, 8);
+    let interior = RawMesh::room(600, 278, 17);
+    [
+        ("terrain", terrain, v(-0.1, 0.6, -0.1), v(0.5, 0.0, 0.5), v(0.5, 1.5, 0.5)),
+        ("interior", interior, v(0.1, 0.5, 0.1), v(0.7, 0.4, 0.8), v(0.5, 0.85, 0.5)),
+    ]
+}
+
+/// Rays per CPU-second through trees of every quality, in turn.
+pub fn rates_by_quality(options: &Options, report: &mut Report) {
+    let repetitions = if options.quick { 3 } else { 7 };
+    for (name, raw, eye, target, _) in scenes() {
+        let mesh = mesh_of(raw);
+        let trees = BvhQuality::ALL.map(|quality| WideTree::build(&mesh, quality));
+        let rays = primary(512, eye, target);
+        let mut times = [const { Vec::new() }; 3];
+        for _ in 0..repetitions {
+            for (tree, times) in trees.iter().zip(&mut times) {
+                let hit = |&&(o, d, _): &&Segment| {
+                    let ray = LocalRay { o: o.as_dvec3(), d: d.as_dvec3() };
+                    tree.closest_hit(&ray, f64::INFINITY).is_some()
+                };
+                times.push(thread_seconds(|| rays.iter().filter(hit).count()).0);
+            }
+        }
+        let [fast, balanced, best] = times.map(|times| rays.len() as f64 * 1e-6 / median(times));
+        report.row(
+            &format!("build.rays.{name}"),
+            &[("fast", fast, ""), ("balanced", balanced, ""), ("best", best, "")],
+        );
+    }
+}
+
 /// Measures both scenes.
 pub fn run(options: &Options, report: &mut Report) {
     let (side, repetitions) = if options.quick { (512, 3) } else { (1024, 7) };
-    let v = Vec3::new;
-    let scenes = [
-        (
-            "terrain",
-            RawMesh::terrain(447, 810, 8),
-            v(-0.1, 0.6, -0.1),
-            v(0.5, 0.0, 0.5),
-            v(0.5, 1.5, 0.5),
-        ),
-        (
-            "interior",
-            RawMesh::room(600, 278, 17),
-            v(0.1, 0.5, 0.1),
-            v(0.7, 0.4, 0.8),
-            v(0.5, 0.85, 0.5),
-        ),
-    ];
     report.section("rays: Mrays per CPU-second through a million triangles");
-    for (name, raw, eye, target, light) in scenes {
+    for (name, raw, eye, target, light) in scenes() {
         let trees = Trees::build(mesh_of(raw));
         let primary = primary(side, eye, target);
         let (bounce1, shadow1) = trees.onward(&primary, light, 1);

@@ -22,7 +22,7 @@ pub use motion::{
 };
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
-pub use settings::{Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
+pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};
 pub use value::{Rgb, Value};

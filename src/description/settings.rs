@@ -56,6 +56,9 @@ pub struct RenderSettings {
     /// How far interpolated motion may stray from the true motion, as a fraction of the distance
     /// that the object moves during the shutter. Trades the shape of curved blur for motion keys.
     pub motion_tolerance: f64,
+    /// How much work goes into the trees of meshes. Trades time and memory before the first ray for
+    /// the time of every ray; the picture is the same.
+    pub bvh: BvhQuality,
     /// Exposure in stops: the picture is multiplied by `2^exposure` before the tone curve.
     pub exposure: f32,
     /// The tone curve of the PNG; the EXR stays linear.
@@ -80,6 +83,7 @@ impl Default for RenderSettings {
             filter: Filter::default(),
             clamp_indirect: None,
             motion_tolerance: 0.001,
+            bvh: BvhQuality::default(),
             exposure: 0.0,
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],
@@ -96,6 +100,23 @@ pub enum IntegratorChoice {
     Auto,
     /// Unidirectional path tracing.
     Path,
+}
+
+/// How the trees of meshes are built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum BvhQuality {
+    /// Soon done: for previews and for meshes that change in every frame.
+    Fast,
+    /// Large triangles are cut into parts.
+    #[default]
+    Balanced,
+    /// In addition parts of the tree are moved to better places: for long renders.
+    Best,
+}
+
+impl BvhQuality {
+    /// Every quality once, from the fastest build to the fastest rays.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Best];
 }
 
 /// Pixel filters, in pixels; sampled by importance, so that each sample has weight 1.

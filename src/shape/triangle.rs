@@ -32,9 +32,15 @@ impl TriangleTest {
     /// The hit with `0 < t < t_max` and the weights of the second and third vertex.
     #[inline]
     pub fn intersect(&self, triangle: [Vec3; 3], t_max: f64) -> Option<(f64, DVec2)> {
+        self.intersect_exact(triangle.map(Vec3::as_dvec3), t_max)
+    }
+
+    /// The same for corners in `f64`.
+    #[inline]
+    pub fn intersect_exact(&self, triangle: [DVec3; 3], t_max: f64) -> Option<(f64, DVec2)> {
         let [kx, ky, kz] = self.axes;
         let sheared = triangle.map(|v| {
-            let v = v.as_dvec3() - self.o;
+            let v = v - self.o;
             DVec3::new(v[kx] - self.shear.x * v[kz], v[ky] - self.shear.y * v[kz], v[kz])
         });
         let [a, b, c] = sheared;

@@ -2,15 +2,13 @@
 
 use super::WideTree;
 use super::resting::RestingTree;
-use crate::description::TriangleMesh;
+use crate::description::{BvhQuality, TriangleMesh};
 use crate::extract::{Geometry, Instances, Meshes};
+use crate::world::Settings;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::Arc;
-
-/// Share of references that cutting large triangles may add to the tree of a mesh.
-const SPLIT_BUDGET: f32 = 0.1;
 
 /// A mesh with its tree.
 #[derive(Clone, Debug)]
@@ -19,18 +17,19 @@ pub struct MeshTree {
     pub mesh: Arc<TriangleMesh>,
     /// `None` for a mesh which is in the tree of resting meshes only.
     tree: Option<WideTree>,
+    quality: BvhQuality,
 }
 
 impl MeshTree {
     /// Builds the tree of a mesh.
-    pub fn build(mesh: Arc<TriangleMesh>) -> Self {
-        let tree = WideTree::build(&mesh, SPLIT_BUDGET);
-        Self { mesh, tree: Some(tree) }
+    pub fn build(mesh: Arc<TriangleMesh>, quality: BvhQuality) -> Self {
+        let tree = WideTree::build(&mesh, quality);
+        Self { mesh, tree: Some(tree), quality }
     }
 
     /// A mesh which no ray looks for.
     fn without_tree(mesh: Arc<TriangleMesh>) -> Self {
-        Self { mesh, tree: None }
+        Self { mesh, tree: None, quality: BvhQuality::default() }
     }
 
     /// The tree.
@@ -56,14 +55,17 @@ pub struct MeshTrees {
 }
 
 /// Builds the trees of new meshes and drops those of removed ones. A mesh whose only instance is in
-/// the tree of resting meshes gets none.
+/// the tree of resting meshes gets none. All are built anew for another quality.
 pub fn rebuild_mesh_trees(
     meshes: Res<Meshes>,
+    settings: Res<Settings>,
     instances: Res<Instances>,
     resting: Res<RestingTree>,
     mut trees: ResMut<MeshTrees>,
 ) {
-    if !(meshes.is_changed() || resting.is_changed()) {
+    let quality = settings.0.bvh;
+    let outdated = |tree: &Arc<MeshTree>| tree.tree.is_some() && tree.quality != quality;
+    if !(meshes.is_changed() || resting.is_changed() || trees.list.iter().any(outdated)) {
         if trees.built != 0 {
             trees.bypass_change_detection().built = 0;
         }
@@ -79,7 +81,9 @@ pub fn rebuild_mesh_trees(
     }
     let old = std::mem::take(&mut trees.list);
     let kept = |mesh: &Arc<TriangleMesh>, wanted: bool| {
-        old.iter().find(|tree| Arc::ptr_eq(&tree.mesh, mesh) && tree.tree.is_some() == wanted)
+        old.iter().find(|tree| {
+            Arc::ptr_eq(&tree.mesh, mesh) && tree.tree.is_some() == wanted && !outdated(tree)
+        })
     };
     let pairs = || meshes.list.iter().zip(wanted.iter().copied());
     trees.built = pairs().filter(|(mesh, wanted)| *wanted && kept(mesh, true).is_none()).count();
@@ -89,7 +93,7 @@ pub fn rebuild_mesh_trees(
         .zip(&wanted)
         .map(|(mesh, &wanted)| match kept(mesh, wanted) {
             Some(tree) => tree.clone(),
-            None if wanted => Arc::new(MeshTree::build(mesh.clone())),
+            None if wanted => Arc::new(MeshTree::build(mesh.clone(), quality)),
             None => Arc::new(MeshTree::without_tree(mesh.clone())),
         })
         .collect();

@@ -20,4 +20,4 @@ pub use resting::{RestingTree, join_resting_meshes};
 pub use surface::SurfacePoint;
 pub use top::{TopLevel, rebuild_top_level};
 pub use tree::Bvh;
-pub use wide::{TriangleHit, WideTree};
+pub use wide::{MovingTree, TriangleHit, WideTree};

@@ -8,9 +8,10 @@
 //! be seen: see [`WORST_ROUNDING`].
 
 use super::MeshTree;
-use crate::description::TriangleMesh;
+use crate::description::{BvhQuality, TriangleMesh};
 use crate::extract::{FrameOrigin, Meshes, RestingMesh, RestingMeshes};
 use crate::math::gamma_f64;
+use crate::world::Settings;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -27,13 +28,18 @@ pub struct RestingTree {
     origin: DVec3,
     /// First triangle and instance of each member, in the order of both.
     members: Vec<(u32, u32)>,
+    quality: BvhQuality,
     /// Whether it was built anew in this frame.
     pub built: bool,
 }
 
 impl RestingTree {
     /// Joins those of `resting` which may be joined, if there are two at least.
-    pub fn build(resting: &[RestingMesh], meshes: &[Arc<TriangleMesh>]) -> Self {
+    pub fn build(
+        resting: &[RestingMesh],
+        meshes: &[Arc<TriangleMesh>],
+        quality: BvhQuality,
+    ) -> Self {
         let origin = middle(resting, meshes);
         let members: Vec<&RestingMesh> = resting
             .iter()
@@ -51,8 +57,8 @@ impl RestingTree {
             shared.positions.extend(corners(member, mesh, origin).map(|p| p.as_vec3()));
             shared.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + base)));
         }
-        let tree = Some(Arc::new(MeshTree::build(Arc::new(shared))));
-        Self { tree, origin, members: starts, built: true }
+        let tree = Some(Arc::new(MeshTree::build(Arc::new(shared), quality)));
+        Self { tree, origin, members: starts, quality, built: true }
     }
 
     /// The first triangle, in the shared tree, of an instance; `None` if it is not part of it.
@@ -126,10 +132,13 @@ pub(super) fn point_error(corners: [Vec3; 3], shift: DVec3, p: DVec3) -> DVec3 {
 pub fn join_resting_meshes(
     resting: Res<RestingMeshes>,
     meshes: Res<Meshes>,
+    settings: Res<Settings>,
     mut tree: ResMut<RestingTree>,
 ) {
-    if resting.is_changed() || (meshes.is_changed() && !resting.0.is_empty()) {
-        let built = RestingTree::build(&resting.0, &meshes.list);
+    let quality = settings.0.bvh;
+    let outdated = tree.tree.is_some() && tree.quality != quality;
+    if resting.is_changed() || outdated || (meshes.is_changed() && !resting.0.is_empty()) {
+        let built = RestingTree::build(&resting.0, &meshes.list, quality);
         if built.tree.is_some() || tree.tree.is_some() {
             *tree = built;
         }

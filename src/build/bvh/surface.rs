@@ -195,7 +195,7 @@ fn interpolated_normal(mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> Op
 mod tests {
     use super::super::TopLevel;
     use super::*;
-    use crate::description::TriangleMesh;
+    use crate::description::{BvhQuality, TriangleMesh};
     use crate::extract::{Instance, NOTHING};
     use crate::math::{Aabb, offset_ray_origin};
     use crate::sampling::Sampler;
@@ -212,7 +212,7 @@ mod tests {
             let positions = vec![three(0), three(3), three(6)];
             let triangles = vec![[0, 1, 2]];
             let mesh = TriangleMesh { positions, triangles, ..Default::default() };
-            let tree = Arc::new(MeshTree::build(Arc::new(mesh)));
+            let tree = Arc::new(MeshTree::build(Arc::new(mesh), BvhQuality::default()));
             let size = 10.0_f64.powf(f64::from(s.one(9)) * 12.0 - 6.0);
             let distance = 10.0_f64.powf(f64::from(s.one(10)) * 14.0 - 7.0);
             let forward = DAffine3::from_scale_rotation_translation(

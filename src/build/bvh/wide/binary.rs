@@ -128,18 +128,48 @@ pub(super) struct BinaryNode {
     right: u32,
 }
 
+impl BinaryNode {
+    pub(super) fn leaf(bounds: Aabb, first: u32, count: u32) -> Self {
+        Self { bounds, first, count, right: 0 }
+    }
+
+    pub(super) fn is_inner(&self) -> bool {
+        self.right != 0
+    }
+
+    pub(super) fn make_inner(&mut self, count: u32, right: u32) {
+        (self.count, self.right) = (count, right);
+    }
+}
+
 /// The slots of the left and of the right subtree below the root of `subtree`.
 pub(super) fn children(subtree: &[BinaryNode]) -> (&[BinaryNode], &[BinaryNode]) {
     subtree[1..].split_at(subtree[0].right as usize - 1)
 }
 
+/// How splits are searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Few bins everywhere.
+    Coarse,
+    /// More bins where there are many references.
+    Fine,
+}
+
 /// Builds the tree and brings the references into its order. Empty without references.
 pub(super) fn build(references: &mut [Reference]) -> Vec<BinaryNode> {
+    build_by(references, Search::Fine)
+}
+
+/// The same with a choice of the search.
+pub(super) fn build_by(references: &mut [Reference], search: Search) -> Vec<BinaryNode> {
     let slots = (2 * references.len()).saturating_sub(1);
     let mut nodes = bytemuck::zeroed_vec(slots);
     if !nodes.is_empty() {
         let summary = Summary::of(references);
-        subdivide(&mut nodes, references, 0, &summary, 0);
+        // From this count on there are many references.
+        let many = if search == Search::Fine { MANY } else { usize::MAX };
+        subdivide(&mut nodes, references, 0, &summary, (0, many));
     }
     nodes
 }
@@ -150,18 +180,18 @@ fn subdivide(
     references: &mut [Reference],
     first: usize,
     summary: &Summary,
-    depth: usize,
+    (depth, many): (usize, usize),
 ) -> usize {
     let count = references.len();
     let Extent { min, max } = summary.boxes;
     let bounds = Aabb { min: min.truncate(), max: max.truncate() };
-    nodes[0] = BinaryNode { bounds, first: first as u32, count: count as u32, right: 0 };
+    nodes[0] = BinaryNode::leaf(bounds, first as u32, count as u32);
     if count <= LEAF {
         return 1;
     }
     let split = match count {
         _ if depth >= DEEPEST_SAH => None,
-        MANY.. => best_split::<MANY_BINS>(references, summary),
+        _ if count >= many => best_split::<MANY_BINS>(references, summary),
         _ => best_split::<FEW_BINS>(references, summary),
     };
     let (middle, left_summary, right_summary) = if let Some(split) = split {
@@ -171,20 +201,20 @@ fn subdivide(
         (left.len(), Summary::of(left), Summary::of(right))
     };
     let (left, right) = references.split_at_mut(middle);
-    let (middle, depth) = (first + middle, depth + 1);
+    let (middle, below) = (first + middle, (depth + 1, many));
     if count >= PARALLEL {
         let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * left.len() - 1);
         let place = 1 + left_nodes.len();
         let (_, used) = rayon::join(
-            || subdivide(left_nodes, left, first, &left_summary, depth),
-            || subdivide(right_nodes, right, middle, &right_summary, depth),
+            || subdivide(left_nodes, left, first, &left_summary, below),
+            || subdivide(right_nodes, right, middle, &right_summary, below),
         );
         nodes[0].right = place as u32;
         return place + used;
     }
-    let place = 1 + subdivide(&mut nodes[1..], left, first, &left_summary, depth);
+    let place = 1 + subdivide(&mut nodes[1..], left, first, &left_summary, below);
     nodes[0].right = place as u32;
-    place + subdivide(&mut nodes[place..], right, middle, &right_summary, depth)
+    place + subdivide(&mut nodes[place..], right, middle, &right_summary, below)
 }
 
 /// How centres map to bins.

@@ -10,8 +10,8 @@ use super::WideTree;
 use super::binary::{BinaryNode, LEAF, PARALLEL, Reference, children};
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
 use super::pages::filled_on_large_pages;
-use crate::description::TriangleMesh;
 use bytemuck::Zeroable;
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Cost of the box test of a node; the unit of costs.
@@ -175,8 +175,9 @@ fn size_of_subtree(nodes: &[BinaryNode], plans: &[Plan]) -> Size {
 }
 
 /// Writes a part of the tree: its own nodes and blocks, which start at these indices of the whole.
-struct Emitter<'a> {
-    mesh: &'a TriangleMesh,
+struct Emitter<'a, C> {
+    /// The corners of a triangle.
+    corners: &'a C,
     /// Triangles of all references, in the order of the binary tree.
     order: &'a [u32],
     nodes: &'a mut [Node],
@@ -185,9 +186,9 @@ struct Emitter<'a> {
     first_block: usize,
 }
 
-impl<'a> Emitter<'a> {
+impl<'a, C: Fn(u32) -> [Vec3; 3] + Sync> Emitter<'a, C> {
     /// Takes so many nodes and blocks from the front for another emitter.
-    fn take(&mut self, nodes: usize, blocks: usize) -> Emitter<'a> {
+    fn take(&mut self, nodes: usize, blocks: usize) -> Emitter<'a, C> {
         let taken = Emitter {
             nodes: self.nodes.split_off_mut(..nodes).expect("the size was measured"),
             blocks: self.blocks.split_off_mut(..blocks).expect("the size was measured"),
@@ -205,7 +206,7 @@ impl<'a> Emitter<'a> {
         let taken = self.take(0, count);
         for (block, four) in taken.blocks.iter_mut().zip(order.chunks(BLOCK)) {
             for (lane, &triangle) in four.iter().enumerate() {
-                block.set(lane, triangle, super::corners(self.mesh, triangle));
+                block.set(lane, triangle, (self.corners)(triangle));
             }
         }
         Child::leaf(taken.first_block, count)
@@ -239,9 +240,9 @@ impl<'a> Emitter<'a> {
     }
 }
 
-/// Makes the wide tree of a binary one.
-pub(super) fn collapse(
-    mesh: &TriangleMesh,
+/// Makes the wide tree of a binary one; `corners` gives those of a triangle.
+pub(super) fn collapse<C: Fn(u32) -> [Vec3; 3] + Sync>(
+    corners: &C,
     references: Vec<Reference>,
     nodes: &[BinaryNode],
 ) -> WideTree {
@@ -265,7 +266,7 @@ pub(super) fn collapse(
     };
     let (nodes_out, blocks_out) = (&mut tree.nodes[..], &mut tree.blocks[..]);
     let mut all = Emitter {
-        mesh,
+        corners,
         order: &order,
         nodes: nodes_out,
         blocks: blocks_out,

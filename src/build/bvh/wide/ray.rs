@@ -2,7 +2,6 @@
 
 use crate::math::Aabb;
 use crate::shape::LocalRay;
-use glam::Vec3;
 
 /// Half the distance from 1 to the next `f32`: the relative error of one rounding.
 const UNIT: f64 = f32::EPSILON as f64 * 0.5;
@@ -83,8 +82,7 @@ impl BoxRay {
     /// out by this test. It rounds like that of the nodes, every step of which is monotonic: a ray
     /// that passes here passes the boxes of all nodes above as well, so that the tree never decides.
     #[inline(always)]
-    pub(super) fn reaches(&self, corners: [Vec3; 3], t: f64) -> bool {
-        let bounds = Aabb::from_points(corners);
+    pub(super) fn reaches(&self, bounds: &Aabb, t: f64) -> bool {
         let planes = [bounds.min, bounds.max];
         let (mut near, mut far) = (0.0, self.distance(t));
         for (axis, plane) in self.near_planes.into_iter().enumerate() {
