@@ -1,7 +1,10 @@
 //! Lights: which there are, choosing one, and drawing a direction towards it.
 
+mod bounds;
 mod choice;
+mod node;
 mod sky;
+mod split;
 mod table;
 mod towards;
 mod tree;

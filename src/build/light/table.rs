@@ -1,8 +1,8 @@
 //! The lights of a frame, with what their choice depends on.
 
 use super::SkyLight;
+use super::bounds::{Cone, LightBounds};
 use super::choice::LightChoice;
-use super::tree::{Cone, LightBounds};
 use crate::build::bvh::{MeshTree, MeshTrees};
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
