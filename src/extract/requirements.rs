@@ -40,28 +40,60 @@ impl Requirements {
     }
 }
 
-/// Writes [`Requirements`] when they are different from before.
+/// How many objects are made of materials of a kind.
+#[derive(Debug, Default)]
+pub struct Census {
+    masked: usize,
+    absorbing: usize,
+    specular: usize,
+}
+
+impl Census {
+    /// Counts the objects; each material is looked at once.
+    fn take(instances: &Instances, surfaces: &Surfaces) -> Self {
+        let mut objects = vec![0; surfaces.default_material as usize + 1];
+        for instance in &instances.list {
+            if let Some(count) = objects.get_mut(instance.material as usize) {
+                *count += 1;
+            }
+        }
+        let materials = &surfaces.materials;
+        let middle = glam::Vec2::splat(0.5);
+        let mut census = Self::default();
+        for (material, count) in (0..).zip(objects).filter(|(_, count)| *count > 0) {
+            census.masked += if materials.has_opacity(material) { count } else { 0 };
+            census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
+            let specular = !materials.bsdf(material, middle, &mut 0.5).has_non_delta();
+            census.specular += if specular { count } else { 0 };
+        }
+        census
+    }
+}
+
+/// Writes [`Requirements`] when something that they follow from changed and they are different from
+/// before. Objects are counted anew only when there are others or their materials changed.
 pub fn derive_requirements(
     instances: Res<Instances>,
     surfaces: Res<Surfaces>,
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
-    named: Query<(&Name, &ShutterMotion), With<Shape>>,
+    named: Query<(&ShutterMotion, &Name), With<Shape>>,
+    mut census: Local<Census>,
     mut requirements: ResMut<Requirements>,
 ) {
+    let rewritten = instances.is_changed();
+    if !(rewritten || surfaces.is_changed() || lights.is_changed() || camera.is_changed()) {
+        return;
+    }
+    if surfaces.is_changed() || (rewritten && instances.restructured) {
+        *census = Census::take(&instances, &surfaces);
+    }
     let mut found = Requirements::default();
     let mut require = |feature, reason: String| found.features.push((feature, reason));
-    let moving = instances.list.iter().filter(|i| !i.motion.is_static()).count()
-        + lights.0.iter().filter(|l| !l.motion.is_static()).count();
+    let moving = instances.moving + lights.0.iter().filter(|l| !l.motion.is_static()).count();
     if moving > 0 {
-        let mut names: Vec<&str> = named
-            .iter()
-            .filter(|(_, motion)| motion.keys.len() > 1)
-            .map(|(name, _)| name.as_str())
-            .collect();
-        names.sort_unstable();
-        let shown = names.iter().take(3).map(|name| format!("`{name}`")).collect::<Vec<_>>();
-        let who = if shown.is_empty() { String::new() } else { format!(": {}", shown.join(", ")) };
+        let who = first_names(named);
+        let who = if who.is_empty() { String::new() } else { format!(": {who}") };
         require(Feature::Motion, format!("{moving} moving in the shutter{who}"));
     }
     if !camera.is_static() {
@@ -70,34 +102,19 @@ pub fn derive_requirements(
     if camera.has_lens() {
         require(Feature::Lens, "the camera has an aperture".to_owned());
     }
-    let used = |test: &dyn Fn(u32) -> bool| {
-        instances.list.iter().filter(|i| i.material != super::NOTHING && test(i.material)).count()
-    };
-    let masked = used(&|m| surfaces.materials.has_opacity(m));
-    if masked > 0 {
-        require(Feature::Opacity, format!("{masked} objects with a mask"));
+    if census.masked > 0 {
+        require(Feature::Opacity, format!("{} objects with a mask", census.masked));
     }
-    let absorbing = used(&|m| surfaces.materials.attenuation(m).is_some());
-    if absorbing > 0 {
-        require(Feature::Absorption, format!("{absorbing} absorbing solids"));
+    if census.absorbing > 0 {
+        require(Feature::Absorption, format!("{} absorbing solids", census.absorbing));
     }
     let skies = lights.0.iter().filter(|l| matches!(l.light, Light::Sky { .. })).count();
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
     }
-    let middle = glam::Vec2::splat(0.5);
-    let specular = used(&|m| !surfaces.materials.bsdf(m, middle, &mut 0.5).has_non_delta());
-    if specular > 0 {
-        require(Feature::Caustics, format!("{specular} mirrors or clear solids"));
-        let points = lights
-            .0
-            .iter()
-            .filter(|l| match l.light {
-                Light::Point { .. } | Light::Spot { .. } => true,
-                Light::Directional { angle, .. } => angle == 0.0,
-                Light::Sky { .. } => false,
-            })
-            .count();
+    if census.specular > 0 {
+        require(Feature::Caustics, format!("{} mirrors or clear solids", census.specular));
+        let points = lights.0.iter().filter(|light| is_point_like(&light.light)).count();
         if points > 0 {
             found.warnings.push(format!(
                 "paths from {points} point-like lights over mirrors or through glass are out of \
@@ -107,4 +124,27 @@ pub fn derive_requirements(
         }
     }
     requirements.set_if_neq(found);
+}
+
+/// The first three names of what moves, in the order of names.
+fn first_names(named: Query<(&ShutterMotion, &Name), With<Shape>>) -> String {
+    let mut first: Vec<&str> = Vec::with_capacity(4);
+    for (_, name) in named.iter().filter(|(motion, _)| motion.keys.len() > 1) {
+        let name = name.as_str();
+        let place = first.partition_point(|known| *known <= name);
+        if place < 3 {
+            first.insert(place, name);
+            first.truncate(3);
+        }
+    }
+    first.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether no path that is drawn without looking at a light can meet it.
+fn is_point_like(light: &Light<u32>) -> bool {
+    match light {
+        Light::Point { .. } | Light::Spot { .. } => true,
+        Light::Directional { angle, .. } => *angle == 0.0,
+        Light::Sky { .. } => false,
+    }
 }

@@ -2,11 +2,12 @@
 
 use super::{Instances, Meshes};
 use crate::world::{
-    Acceleration, ChildOf, Emission, HiddenFromCamera, Keyframes, LookAt, Mesh, Shape,
-    ShutterMotion, Velocity,
+    Acceleration, ChildOf, Emission, HiddenFromCamera, Keyframes, LookAt, Shape, ShutterMotion,
+    Velocity,
 };
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
+use bevy_ecs::system::SystemParam;
 use glam::DAffine3;
 
 /// A mesh which stands still and is used once.
@@ -29,11 +30,28 @@ pub struct RestingMesh {
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct RestingMeshes(pub Vec<RestingMesh>);
 
-/// What moves something.
-type Moves = Or<(With<Velocity>, With<Acceleration>, With<Keyframes>, With<LookAt>)>;
+/// Components which move what they are on.
+type MovesItself = Or<(With<Velocity>, With<Acceleration>, With<Keyframes>, With<LookAt>)>;
+
+/// What moves an entity: components of its own and of what it hangs on.
+#[derive(SystemParam)]
+pub struct Moves<'w, 's> {
+    movers: Query<'w, 's, Entity, MovesItself>,
+    parents: Query<'w, 's, &'static ChildOf>,
+}
+
+impl Moves<'_, '_> {
+    fn moves(&self, entity: Entity) -> bool {
+        std::iter::successors(Some(entity), |e| self.parents.get(*e).ok().map(ChildOf::parent))
+            .any(|e| self.movers.contains(e))
+    }
+}
+
+/// How many objects use each mesh; counted when the objects changed.
+#[derive(Default)]
+pub struct Uses(EntityHashMap<u32>);
 
 /// Writes [`RestingMeshes`] when it is different from before.
-#[expect(clippy::type_complexity, reason = "the signature lists what the table depends on")]
 pub fn extract_resting_meshes(
     meshes: Res<Meshes>,
     instances: Res<Instances>,
@@ -42,45 +60,39 @@ pub fn extract_resting_meshes(
         (Without<Emission>, Without<HiddenFromCamera>),
     >,
     users: Query<&Shape>,
-    changed: Query<
-        (),
-        (With<Shape>, Or<(Changed<ShutterMotion>, Changed<Shape>, Changed<ChildOf>)>),
-    >,
-    movers: Query<Entity, Moves>,
-    parents: Query<&ChildOf>,
-    kinds: Query<&Mesh>,
+    changed: Query<(Entity, &Shape), Or<(Changed<ShutterMotion>, Changed<ChildOf>)>>,
+    moves: Moves,
+    mut uses: Local<Uses>,
     mut table: ResMut<RestingMeshes>,
 ) {
-    if !(meshes.is_changed() || instances.is_changed()) && changed.is_empty() {
-        return;
-    }
-    if kinds.is_empty() {
-        table.set_if_neq(RestingMeshes::default());
-        return;
-    }
-    let mut uses = EntityHashMap::<u32>::default();
-    for shape in &users {
-        if let Shape::Mesh(mesh) = shape {
-            *uses.entry(*mesh).or_default() += 1;
+    let restructured = meshes.is_changed() || (instances.is_changed() && instances.restructured);
+    if restructured {
+        uses.0.clear();
+        for shape in &users {
+            if let Shape::Mesh(mesh) = shape {
+                *uses.0.entry(*mesh).or_default() += 1;
+            }
         }
     }
-    let moves = |entity: Entity| {
-        std::iter::successors(Some(entity), |e| parents.get(*e).ok().map(ChildOf::parent))
-            .any(|e| movers.contains(e))
+    let once = |mesh: Entity| uses.0.get(&mesh) == Some(&1);
+    let concerns = |(entity, shape): (Entity, &Shape)| match shape {
+        Shape::Mesh(mesh) => once(*mesh) && !moves.moves(entity),
+        _ => false,
     };
+    if !restructured && !changed.iter().any(concerns) {
+        return;
+    }
     let mut found: Vec<RestingMesh> = objects
         .iter()
         .filter_map(|(entity, shape, motion)| {
             let (Shape::Mesh(mesh), [world_from_mesh]) = (shape, motion.keys.as_slice()) else {
                 return None;
             };
-            let once = uses.get(mesh) == Some(&1);
-            let (instance, mesh) = (instances.slot(entity)?, meshes.slot(*mesh)?);
-            (once && !moves(entity)).then_some(RestingMesh {
-                instance,
-                mesh,
-                world_from_mesh: *world_from_mesh,
-            })
+            if !once(*mesh) || moves.moves(entity) {
+                return None;
+            }
+            let (instance, (mesh, _)) = (instances.slot(entity)?, meshes.slot(*mesh)?);
+            Some(RestingMesh { instance, mesh, world_from_mesh: *world_from_mesh })
         })
         .collect();
     found.sort_unstable_by_key(|resting| resting.instance);

@@ -18,6 +18,7 @@ pub use shutter::sample_shutter;
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel, SingleThreadedExecutor};
 
+use crate::frame::{FrameSystems, StageClock, stamp};
 use crate::world::SceneTime;
 
 /// The schedule of the pose systems; it runs once for every sample of the shutter.
@@ -39,6 +40,7 @@ pub enum PoseSystems {
 /// Adds the pose schedule and the resources of this stage to the world, and its system to `frame`.
 pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(SceneTime::default());
+    world.init_resource::<StageClock>();
     let mut poses = Schedule::new(Pose);
     poses.set_executor(SingleThreadedExecutor::new());
     let ambiguity_detection = LogLevel::Error;
@@ -51,5 +53,5 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         propagate_poses.in_set(PoseSystems::Propagate),
     ));
     world.add_schedule(poses);
-    frame.add_systems(sample_shutter.in_set(crate::frame::FrameSystems::Step));
+    frame.add_systems((sample_shutter, stamp("poses")).chain().in_set(FrameSystems::Step));
 }

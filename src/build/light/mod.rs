@@ -1,8 +1,11 @@
 //! Lights: which there are, choosing one, and drawing a direction towards it.
 
+mod bounds;
 mod choice;
+mod node;
 mod shapes;
 mod sky;
+mod split;
 mod table;
 mod towards;
 mod tree;
