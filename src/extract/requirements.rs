@@ -2,7 +2,7 @@
 
 use super::{Instances, PunctualLights, Surfaces, ViewCamera};
 use crate::description::Light;
-use crate::world::{Name, Shape, ShutterMotion};
+use crate::world::{Deformation, Name, Shape, ShutterMotion, VertexMotion};
 use bevy_ecs::prelude::*;
 
 /// Something that a scene may require.
@@ -14,6 +14,8 @@ pub enum Feature {
     CameraMotion,
     /// A lens with an aperture.
     Lens,
+    /// Meshes whose vertices move within the shutter.
+    Deformation,
     /// Surfaces with holes.
     Opacity,
     /// Solids which absorb light inside.
@@ -47,6 +49,7 @@ pub fn derive_requirements(
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
     named: Query<(&Name, &ShutterMotion), With<Shape>>,
+    deforming: Query<(Option<&Name>, &VertexMotion), With<Deformation>>,
     mut requirements: ResMut<Requirements>,
 ) {
     let mut found = Requirements::default();
@@ -63,6 +66,17 @@ pub fn derive_requirements(
         let shown = names.iter().take(3).map(|name| format!("`{name}`")).collect::<Vec<_>>();
         let who = if shown.is_empty() { String::new() } else { format!(": {}", shown.join(", ")) };
         require(Feature::Motion, format!("{moving} moving in the shutter{who}"));
+    }
+    let mut forms: Vec<_> = deforming
+        .iter()
+        .filter(|(_, motion)| !motion.later.is_empty())
+        .map(|(name, motion)| (name.map_or("", |name| name.as_str()), motion.later.len() + 1))
+        .collect();
+    forms.sort_unstable();
+    if let Some((name, keys)) = forms.first() {
+        let count = forms.len();
+        let reason = format!("{count} deforming in the shutter: `{name}` with {keys} keys");
+        require(Feature::Deformation, reason);
     }
     if !camera.is_static() {
         require(Feature::CameraMotion, "the camera moves in the shutter".to_owned());
