@@ -116,7 +116,7 @@ pub fn fish() -> Figure {
         parts: FISH.iter().map(Ellipsoid::new).collect(),
         hollow: None,
         stands: false,
-        min: DVec3::new(-0.35, -0.13, -0.11),
+        min: DVec3::new(-0.352, -0.131, -0.11),
         max: DVec3::new(0.21, 0.13, 0.11),
     }
 }

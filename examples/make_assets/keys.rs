@@ -74,7 +74,7 @@ pub fn fish_heading() -> String {
 }
 
 /// The ball in `water` floats 6 cm above the height of the waves. Keys 1/16 s apart; waves of 3 Hz and
-/// 3 mm between them are followed to 0.00002 m.
+/// 3 mm between them are followed to 0.00004 m.
 pub fn float_place() -> String {
     places((0..=32).map(|k| {
         let (t, [height, ..], [rise, ..]) = float(k);
@@ -82,7 +82,7 @@ pub fn float_place() -> String {
     }))
 }
 
-/// The tilt of the waves under the ball: about x (1) or about z (2), in degrees.
+/// The tilt of the waves under the ball: about x (1) or about z (2), in degrees, followed to 0.05°.
 pub fn float_tilt(about: usize) -> String {
     list((0..=32).map(|k| {
         let (t, tilt, slope) = float(k);

@@ -673,3 +673,18 @@ fn many_mistakes_of_one_file_are_told_together() {
     scene.ron:25:63: expected `true` or `false`, found `yes`
     "#);
 }
+
+#[test]
+fn mistakes_in_water_are_told_with_their_place() {
+    let water = |fields: &str| {
+        let text = with_part(&format!("meshes: {{\"sea\": Waves({fields})}}"));
+        with_settings(&text, &[]).map(|_| ()).expect_err("it is wrong").to_string()
+    };
+    insta::assert_snapshot!(water("size: (3, 0), cells: (0, 10), steepness: 1.5, gravity: -1, waves: []"), @"");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0, height: 1)]"), @"");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0), (frequency: 1)]"), @"");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0)]"), @"");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (65536, 65536), waves: [(amplitude: 1, frequency: 1)]"), @"");
+    // a·k = 0.5·(2π)²/9.81 = 2.01
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), steepness: 0.7, waves: [(amplitude: 0.5, frequency: 1)]"), @"");
+}
