@@ -5,6 +5,7 @@
 
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
+use std::fmt::Write;
 
 /// Periods in 2 s, direction in degrees from +x to +z, amplitude in millimetres, phase in radians.
 pub const TRAINS: [(f64, f64, f64, f64); 10] = [
@@ -61,17 +62,18 @@ pub fn float(at: DVec2, t: f64) -> [f64; 3] {
 
 /// The waves as the scene file has them inside `waves: [ ]`.
 pub fn list() -> String {
-    TRAINS
-        .iter()
-        .map(|(periods, degrees, millimetres, phase)| {
-            let round = |x: f64| (x * 1e6).round() / 1e6;
-            format!(
-                "\n                (amplitude: {:?}, frequency: {:?}, direction: {:?}, phase: {:?}),",
-                round(millimetres / 1000.0),
-                periods / 2.0,
-                degrees,
-                round(phase.to_degrees())
-            )
-        })
-        .collect()
+    let round = |x: f64| (x * 1e6).round() / 1e6;
+    let mut text = String::new();
+    for (periods, direction, millimetres, phase) in TRAINS {
+        let (amplitude, frequency) = (round(millimetres / 1000.0), periods / 2.0);
+        let phase = round(phase.to_degrees());
+        text.push_str("\n                ");
+        write!(
+            text,
+            "(amplitude: {amplitude:?}, frequency: {frequency:?}, direction: {direction:?}, \
+             phase: {phase:?}),"
+        )
+        .expect("strings do not fail");
+    }
+    text
 }

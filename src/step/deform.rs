@@ -187,7 +187,7 @@ mod tests {
             .fold(0.0, f64::max);
         // Positions are f32: 6e-8 of at most 1.5 m, at both keys.
         let rounding = 2.0 * 1.5 * f64::from(f32::EPSILON);
-        assert!(segments >= 2 && segments < MOST_SEGMENTS, "{segments}");
+        assert!((2..MOST_SEGMENTS).contains(&segments), "{segments}");
         assert!(stray(1) <= 0.001 * moved + rounding, "{:e} of {moved:e}", stray(1));
         assert!(stray(2) > 0.001 * moved, "{:e} of {moved:e}", stray(2));
     }
