@@ -12,6 +12,7 @@ mod settings;
 mod shape;
 mod texture;
 mod value;
+mod waves;
 
 pub use camera::{Camera, Focus, SENSOR_HEIGHT};
 pub use diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
@@ -26,3 +27,4 @@ pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSet
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};
 pub use value::{Rgb, Value};
+pub use waves::{Wave, Waves};

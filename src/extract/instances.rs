@@ -5,7 +5,8 @@ use super::{Emissions, FrameOrigin, SurfaceSlots, Surfaces, spawn_order};
 use crate::description::TriangleMesh;
 use crate::math::Aabb;
 use crate::world::{
-    Emission, HiddenFromCamera, MadeOf, Material, Mesh, Name, Shape, ShutterMotion,
+    Deformation, Emission, HiddenFromCamera, MadeOf, Material, Mesh, Name, Shape, ShutterMotion,
+    VertexMotion, Vertices,
 };
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
@@ -19,8 +20,11 @@ const PLACED_AT_ONCE: usize = 256;
 /// All meshes, in the order of spawning.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Meshes {
-    /// Their triangles.
+    /// Their triangles, as the shutter opens.
     pub list: Vec<Arc<TriangleMesh>>,
+    /// For each its other keys over the shutter, evenly spaced up to the closing; empty for a mesh
+    /// which keeps its form. `list` holds the first key.
+    pub later_keys: Vec<Arc<Vec<Vertices>>>,
     slots: EntityHashMap<(u32, Aabb)>,
 }
 
@@ -31,20 +35,32 @@ impl Meshes {
     }
 }
 
-/// Writes [`Meshes`] when one was added, replaced or removed.
+/// Writes [`Meshes`] when one was added, replaced, removed or deformed.
 pub fn extract_meshes(
-    changed: Query<(), Changed<Mesh>>,
+    changed: Query<(), (With<Mesh>, Or<(Changed<Mesh>, Changed<VertexMotion>)>)>,
     mut removed: RemovedComponents<Mesh>,
-    meshes: Query<(Entity, &Mesh)>,
+    mut rigid: RemovedComponents<Deformation>,
+    meshes: Query<(Entity, &Mesh, Option<&VertexMotion>, Has<Deformation>)>,
     mut table: ResMut<Meshes>,
 ) {
-    if changed.is_empty() && removed.read().count() == 0 {
+    if changed.is_empty() && removed.read().count() + rigid.read().count() == 0 {
         return;
     }
-    let mut found: Vec<(Entity, &Mesh)> = meshes.iter().collect();
-    found.sort_unstable_by_key(|(entity, _)| spawn_order(*entity));
-    table.list = found.iter().map(|(_, mesh)| mesh.data().clone()).collect();
-    table.slots = found.iter().zip(0..).map(|((e, mesh), k)| (*e, (k, mesh.bounds()))).collect();
+    let mut found: Vec<_> = meshes.iter().collect();
+    found.sort_unstable_by_key(|(entity, ..)| spawn_order(*entity));
+    let table = &mut *table;
+    table.list.clear();
+    table.later_keys.clear();
+    table.slots.clear();
+    for ((entity, mesh, motion, deforms), slot) in found.into_iter().zip(0..) {
+        let (data, later, bounds) = match motion.filter(|_| deforms) {
+            Some(motion) => (&motion.opening, motion.later.clone(), motion.bounds),
+            None => (mesh.data(), Arc::default(), mesh.bounds()),
+        };
+        table.list.push(data.clone());
+        table.later_keys.push(later);
+        table.slots.insert(entity, (slot, bounds));
+    }
 }
 
 /// All objects, in the order of spawning.

@@ -1,8 +1,8 @@
 //! What a scene requires, with the reason; everything else is left out of the work.
 
-use super::{Instances, PunctualLights, Surfaces, ViewCamera};
+use super::{Instances, Meshes, PunctualLights, Surfaces, ViewCamera};
 use crate::description::Light;
-use crate::world::{Name, Shape, ShutterMotion};
+use crate::world::{Deformation, Name, Shape, ShutterMotion, VertexMotion};
 use bevy_ecs::prelude::*;
 
 /// Something that a scene may require.
@@ -14,6 +14,8 @@ pub enum Feature {
     CameraMotion,
     /// A lens with an aperture.
     Lens,
+    /// Meshes whose vertices move within the shutter.
+    Deformation,
     /// Surfaces with holes.
     Opacity,
     /// Solids which absorb light inside.
@@ -74,15 +76,18 @@ impl Census {
 /// before. Objects are counted anew only when there are others or their materials changed.
 pub fn derive_requirements(
     instances: Res<Instances>,
+    meshes: Res<Meshes>,
     surfaces: Res<Surfaces>,
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
     named: Query<(&ShutterMotion, &Name), With<Shape>>,
     mut census: Local<Census>,
+    deforming: Query<(Option<&Name>, &VertexMotion), With<Deformation>>,
     mut requirements: ResMut<Requirements>,
 ) {
     let rewritten = instances.is_changed();
-    if !(rewritten || surfaces.is_changed() || lights.is_changed() || camera.is_changed()) {
+    let looks = surfaces.is_changed() || lights.is_changed() || camera.is_changed();
+    if !(rewritten || looks || meshes.is_changed()) {
         return;
     }
     if surfaces.is_changed() || (rewritten && instances.restructured) {
@@ -95,6 +100,17 @@ pub fn derive_requirements(
         let who = first_names(named);
         let who = if who.is_empty() { String::new() } else { format!(": {who}") };
         require(Feature::Motion, format!("{moving} moving in the shutter{who}"));
+    }
+    let mut forms: Vec<_> = deforming
+        .iter()
+        .filter(|(_, motion)| !motion.later.is_empty())
+        .map(|(name, motion)| (name.map_or("", |name| name.as_str()), motion.later.len() + 1))
+        .collect();
+    forms.sort_unstable();
+    if let Some((name, keys)) = forms.first() {
+        let count = forms.len();
+        let reason = format!("{count} deforming in the shutter: `{name}` with {keys} keys");
+        require(Feature::Deformation, reason);
     }
     if !camera.is_static() {
         require(Feature::CameraMotion, "the camera moves in the shutter".to_owned());

@@ -2,8 +2,8 @@
 
 use super::{Instances, Meshes};
 use crate::world::{
-    Acceleration, ChildOf, Emission, HiddenFromCamera, Keyframes, LookAt, Shape, ShutterMotion,
-    Velocity,
+    Acceleration, ChildOf, Deformation, Emission, HiddenFromCamera, Keyframes, LookAt, Shape,
+    ShutterMotion, Velocity,
 };
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
@@ -38,10 +38,15 @@ type MovesItself = Or<(With<Velocity>, With<Acceleration>, With<Keyframes>, With
 pub struct Moves<'w, 's> {
     movers: Query<'w, 's, Entity, MovesItself>,
     parents: Query<'w, 's, &'static ChildOf>,
+    deforming: Query<'w, 's, (), With<Deformation>>,
 }
 
 impl Moves<'_, '_> {
-    fn moves(&self, entity: Entity) -> bool {
+    /// Whether an object or its mesh moves.
+    fn moves(&self, entity: Entity, mesh: Entity) -> bool {
+        if self.deforming.contains(mesh) {
+            return true;
+        }
         std::iter::successors(Some(entity), |e| self.parents.get(*e).ok().map(ChildOf::parent))
             .any(|e| self.movers.contains(e))
     }
@@ -76,7 +81,7 @@ pub fn extract_resting_meshes(
     }
     let once = |mesh: Entity| uses.0.get(&mesh) == Some(&1);
     let concerns = |(entity, shape): (Entity, &Shape)| match shape {
-        Shape::Mesh(mesh) => once(*mesh) && !moves.moves(entity),
+        Shape::Mesh(mesh) => once(*mesh) && !moves.moves(entity, *mesh),
         _ => false,
     };
     if !restructured && !changed.iter().any(concerns) {
@@ -88,7 +93,7 @@ pub fn extract_resting_meshes(
             let (Shape::Mesh(mesh), [world_from_mesh]) = (shape, motion.keys.as_slice()) else {
                 return None;
             };
-            if !once(*mesh) || moves.moves(entity) {
+            if !once(*mesh) || moves.moves(entity, *mesh) {
                 return None;
             }
             let (instance, (mesh, _)) = (instances.slot(entity)?, meshes.slot(*mesh)?);

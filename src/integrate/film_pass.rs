@@ -65,7 +65,9 @@ pub fn render_film(
         settings,
         filter: FilterSampler::new(&settings.filter),
         frame: clock.frame,
-        has_time: requires(Feature::Motion) || requires(Feature::CameraMotion),
+        has_time: requires(Feature::Motion)
+            || requires(Feature::CameraMotion)
+            || requires(Feature::Deformation),
         has_lens: requires(Feature::Lens),
         share: shared_side(settings, scene.requirements),
         control: &control,
@@ -88,7 +90,7 @@ pub fn render_film(
 /// Paths of different times see different scenes; surfaces with holes and solids which absorb would
 /// have to be followed along every connection; and a limit on radiance is one of single paths.
 fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
-    let hindered = [Feature::Motion, Feature::Opacity, Feature::Absorption]
+    let hindered = [Feature::Motion, Feature::Deformation, Feature::Opacity, Feature::Absorption]
         .into_iter()
         .any(|feature| requirements.has(feature));
     if hindered || settings.clamp_indirect.is_some() { 1 } else { settings.share.clamp(1, 4) }

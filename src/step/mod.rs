@@ -6,11 +6,14 @@
 //! therefore be evaluated alone, and a system added by a program gets motion blur without doing
 //! anything for it.
 
+mod deform;
 mod hierarchy;
 mod pose;
 mod shutter;
 mod track;
+mod waves;
 
+pub use deform::deform_meshes;
 pub use hierarchy::propagate_poses;
 pub use pose::{PoseInput, evaluate_optics_at, local_pose, pose_moving_entities};
 pub use shutter::sample_shutter;
@@ -53,5 +56,6 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         propagate_poses.in_set(PoseSystems::Propagate),
     ));
     world.add_schedule(poses);
-    frame.add_systems((sample_shutter, stamp("poses")).chain().in_set(FrameSystems::Step));
+    let systems = (sample_shutter, stamp("poses"), deform_meshes, stamp("deformation"));
+    frame.add_systems(systems.chain().in_set(FrameSystems::Step));
 }

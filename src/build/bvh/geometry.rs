@@ -79,7 +79,9 @@ impl SceneGeometry<'_> {
         let mut blocked = false;
         let mut visit = |index: u32, t_max: f64| {
             blocked = match (index, &self.top.joined) {
-                (RESTING, Some(joined)) => joined.tree.tree().any_hit(&shifted(ray, joined), t_max),
+                (RESTING, Some(joined)) => {
+                    joined.tree.any_hit(&shifted(ray, joined), ray.time, t_max)
+                }
                 _ => self.blocks(&self.instances[index as usize], ray, t_max),
             };
             if blocked { 0.0 } else { t_max }
@@ -105,12 +107,9 @@ impl SceneGeometry<'_> {
                 weights: DVec2::ZERO,
             }),
             Geometry::Mesh(mesh) => {
-                self.meshes[mesh as usize].tree().closest_hit(&local, t_max).map(|hit| Hit {
-                    t: hit.t,
-                    instance: index,
-                    primitive: hit.triangle,
-                    weights: hit.weights,
-                })
+                let hit = self.meshes[mesh as usize].closest_hit(&local, ray.time, t_max)?;
+                let (primitive, weights) = (hit.triangle, hit.weights);
+                Some(Hit { t: hit.t, instance: index, primitive, weights })
             }
         }
     }
@@ -121,7 +120,7 @@ impl SceneGeometry<'_> {
         let local = to_instance(instance, ray);
         match instance.geometry {
             Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).is_some(),
-            Geometry::Mesh(mesh) => self.meshes[mesh as usize].tree().any_hit(&local, t_max),
+            Geometry::Mesh(mesh) => self.meshes[mesh as usize].any_hit(&local, ray.time, t_max),
         }
     }
 }
@@ -129,7 +128,7 @@ impl SceneGeometry<'_> {
 /// The nearest hit of the resting meshes with `0 < t < t_max`.
 #[inline]
 fn hit_joined(joined: &Joined, ray: &Ray, t_max: f64) -> Option<Hit> {
-    let hit = joined.tree.tree().closest_hit(&shifted(ray, joined), t_max)?;
+    let hit = joined.tree.closest_hit(&shifted(ray, joined), ray.time, t_max)?;
     let (instance, primitive) = joined.members.owner(hit.triangle);
     Some(Hit { t: hit.t, instance, primitive, weights: hit.weights })
 }

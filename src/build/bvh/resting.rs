@@ -13,7 +13,7 @@ use crate::extract::{FrameOrigin, Meshes, RestingMesh, RestingMeshes};
 use crate::math::gamma_f64;
 use crate::world::Settings;
 use bevy_ecs::prelude::*;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::sync::Arc;
 
 /// The most by which joining may move a corner, as a share of the mean length of the edges of its
@@ -123,9 +123,9 @@ fn may_join(member: &RestingMesh, mesh: &TriangleMesh, origin: DVec3) -> bool {
 
 /// Bound per axis of the error of a point of a triangle that was computed in `f64` from its corners
 /// and shifted to render space: three products, three sums, and the way back of the next ray.
-pub(super) fn point_error(corners: [Vec3; 3], shift: DVec3, p: DVec3) -> DVec3 {
-    let reach = corners.iter().fold(Vec3::ZERO, |reach, v| reach.max(v.abs()));
-    (reach.as_dvec3() + shift.abs() + p.abs()) * gamma_f64(8)
+pub(super) fn point_error(corners: [DVec3; 3], shift: DVec3, p: DVec3) -> DVec3 {
+    let reach = corners.iter().fold(DVec3::ZERO, |reach, v| reach.max(v.abs()));
+    (reach + shift.abs() + p.abs()) * gamma_f64(8)
 }
 
 /// Builds [`RestingTree`] anew when a mesh came to rest, left, or is at another place.

@@ -60,8 +60,7 @@ impl SceneGeometry<'_> {
         if let (Some(joined), Geometry::Mesh(mesh)) = (&self.top.joined, instance.geometry)
             && let Some(first) = joined.members.first_triangle(hit.instance)
         {
-            let mesh = &self.meshes[mesh as usize].mesh;
-            return joined.surface(mesh, first, hit, instance);
+            return joined.surface(&self.meshes[mesh as usize], first, hit, instance);
         }
         let surface = |forward: &DAffine3, inverse: &DAffine3| {
             let local = match instance.geometry {
@@ -71,7 +70,7 @@ impl SceneGeometry<'_> {
                 }
                 Geometry::Mesh(mesh) => {
                     let mesh = &self.meshes[mesh as usize];
-                    mesh.surface(hit.primitive, hit.weights, instance.needs_uv)
+                    mesh.surface(hit.primitive, hit.weights, ray.time, instance.needs_uv)
                 }
             };
             SurfacePoint::new(&local, forward, inverse)
@@ -87,23 +86,22 @@ impl SceneGeometry<'_> {
 
     /// Where the point of the surface that `ray` hit is at another time of the shutter.
     pub fn point_at(&self, ray: &Ray, hit: &Hit, time: f32) -> DVec3 {
-        let motion = &self.instances[hit.instance as usize].motion;
-        motion
-            .at(time)
-            .transform_point3(motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)))
+        let Instance { motion, geometry, .. } = &self.instances[hit.instance as usize];
+        let local = match geometry {
+            Geometry::Mesh(mesh) if self.meshes[*mesh as usize].deforms() => {
+                let corners = self.meshes[*mesh as usize].corners(hit.primitive, time);
+                Facet::new(corners, hit.weights).p
+            }
+            _ => motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)),
+        };
+        motion.at(time).transform_point3(local)
     }
 }
 
 impl Joined {
     /// The surface of a triangle of an instance whose first triangle in the shared tree is `first`.
-    fn surface(
-        &self,
-        mesh: &TriangleMesh,
-        first: u32,
-        hit: &Hit,
-        instance: &Instance,
-    ) -> SurfacePoint {
-        let corners = self.tree.corners(first + hit.primitive);
+    fn surface(&self, tree: &MeshTree, first: u32, hit: &Hit, instance: &Instance) -> SurfacePoint {
+        let corners = self.tree.corners(first + hit.primitive, 0.0);
         let facet = Facet::new(corners, hit.weights);
         let MotionTransform::Static { forward, inverse } = &instance.motion else {
             unreachable!("what moves is not joined");
@@ -111,13 +109,13 @@ impl Joined {
         // A mirroring map turns the order of the corners: the outside stays outside.
         let outward = if forward.matrix3.determinant() < 0.0 { -facet.ng } else { facet.ng };
         let ng = outward.normalize().as_vec3();
-        let ns = interpolated_normal(mesh, hit.primitive, hit.weights)
+        let ns = interpolated(tree.normals(hit.primitive, 0.0), hit.weights)
             .map(|n| (inverse.matrix3.transpose() * n).normalize())
             .filter(|n| n.is_finite())
             .map_or(ng, DVec3::as_vec3);
         let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
         let (uv, dpdu) = if instance.needs_uv {
-            facet.parameters(mesh, hit.primitive, hit.weights)
+            facet.parameters(&tree.mesh, hit.primitive, hit.weights)
         } else {
             (Vec2::ZERO, DVec3::ZERO)
         };
@@ -128,11 +126,17 @@ impl Joined {
 }
 
 impl MeshTree {
-    /// The surface of a triangle at these weights of its second and third corner. Texture coordinates
-    /// are left out, and uv is 0, unless `needs_uv`.
-    pub fn surface(&self, triangle: u32, weights: DVec2, needs_uv: bool) -> LocalSurface {
-        let facet = Facet::new(self.corners(triangle), weights);
-        let ns = interpolated_normal(&self.mesh, triangle, weights).unwrap_or(facet.ng);
+    /// The surface of a triangle at these weights of its second and third corner, at a time in the
+    /// shutter. Texture coordinates are left out, and uv is 0, unless `needs_uv`.
+    pub fn surface(
+        &self,
+        triangle: u32,
+        weights: DVec2,
+        time: f32,
+        needs_uv: bool,
+    ) -> LocalSurface {
+        let facet = Facet::new(self.corners(triangle, time), weights);
+        let ns = interpolated(self.normals(triangle, time), weights).unwrap_or(facet.ng);
         let (uv, dpdu) = if needs_uv {
             facet.parameters(&self.mesh, triangle, weights)
         } else {
@@ -153,8 +157,7 @@ struct Facet {
 
 impl Facet {
     #[inline]
-    fn new(corners: [Vec3; 3], weights: DVec2) -> Self {
-        let [a, b, c] = corners.map(Vec3::as_dvec3);
+    fn new([a, b, c]: [DVec3; 3], weights: DVec2) -> Self {
         let (e1, e2) = (b - a, c - a);
         // The product of two numbers of f32 neither under- nor overflows in f64.
         let ng = e1.cross(e2);
@@ -179,14 +182,11 @@ impl Facet {
     }
 }
 
-/// The normal between those of the corners, of any length; `None` where the mesh has none, or where
+/// The normal between those of the corners, of any length; `None` where there are none, or where
 /// opposite normals cancel.
 #[inline]
-fn interpolated_normal(mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> Option<DVec3> {
-    if mesh.normals.is_empty() {
-        return None;
-    }
-    let [a, b, c] = mesh.triangles[triangle as usize].map(|k| mesh.normals[k as usize].as_dvec3());
+fn interpolated(normals: Option<[DVec3; 3]>, weights: DVec2) -> Option<DVec3> {
+    let [a, b, c] = normals?;
     let sum = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
     (sum.length_squared() > 0.0).then_some(sum)
 }
@@ -238,7 +238,8 @@ mod tests {
             let scene = SceneGeometry { instances: &instances, meshes: &meshes, top: &top };
             let root = s.one(17).sqrt();
             let weights = DVec2::new(f64::from(1.0 - root), f64::from(root * s.one(18)));
-            let surface = SurfacePoint::new(&tree.surface(0, weights, false), &forward, &inverse);
+            let surface =
+                SurfacePoint::new(&tree.surface(0, weights, 0.0, false), &forward, &inverse);
             for k in 0..4 {
                 let d = (three(20 + 3 * k)).normalize();
                 let o = offset_ray_origin(surface.p, surface.p_error, surface.ng, d);

@@ -37,7 +37,7 @@ impl Joined {
     }
 
     fn bounds(&self) -> Aabb {
-        self.tree.tree().bounds().transformed(&DAffine3::from_translation(self.shift))
+        self.tree.bounds().transformed(&DAffine3::from_translation(self.shift))
     }
 }
 

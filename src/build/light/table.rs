@@ -185,9 +185,12 @@ impl Builder<'_> {
             return;
         };
         let map = instance.motion.at(0.0);
-        let triangles = match instance.geometry {
-            Geometry::Primitive(_) => None,
-            Geometry::Mesh(mesh) => Some(triangles(&meshes.list[mesh as usize], &map)),
+        let (triangles, rigid) = match instance.geometry {
+            Geometry::Primitive(_) => (None, true),
+            Geometry::Mesh(mesh) => {
+                let tree = &meshes.list[mesh as usize];
+                (Some(triangles(tree, &map)), !tree.deforms())
+            }
         };
         let area = match (&triangles, instance.geometry) {
             (None, Geometry::Primitive(primitive)) => primitive.world_area(&map),
@@ -214,7 +217,8 @@ impl Builder<'_> {
                 for (k, triangle) in (0..).zip(triangles) {
                     let flux = flux_per_area * triangle.area;
                     // What moves is somewhere in the bounds of the whole, facing anywhere.
-                    let light = if instance.motion.is_static() && triangle.area > 0.0 {
+                    let at_rest = rigid && instance.motion.is_static();
+                    let light = if at_rest && triangle.area > 0.0 {
                         let cone = Cone::facing(triangle.normal);
                         LightBounds { bounds: triangle.bounds, flux, cone, two_sided }
                     } else {
@@ -287,8 +291,8 @@ struct Triangle {
 fn triangles(tree: &MeshTree, map: &DAffine3) -> Vec<Triangle> {
     let count = tree.mesh.triangles.len() as u32;
     let triangle = |triangle: u32| {
-        let corners = tree.corners(triangle);
-        let [a, b, c] = corners.map(|corner| map.transform_point3(corner.as_dvec3()));
+        let corners = tree.corners(triangle, 0.0);
+        let [a, b, c] = corners.map(|corner| map.transform_point3(corner));
         // The side that is outside stays outside under a mirroring map.
         let normal = (b - a).cross(c - a) * map.matrix3.determinant().signum();
         Triangle {

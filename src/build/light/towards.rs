@@ -229,7 +229,7 @@ impl Lights<'_> {
             }
             Geometry::Mesh(_) => (
                 first + primitive,
-                triangle_pdf(from.p, self.triangle(instance, primitive, &map), q),
+                triangle_pdf(from.p, self.triangle(instance, primitive, time, &map), q),
             ),
         };
         self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon) * pdf as f32
@@ -268,12 +268,12 @@ impl Lights<'_> {
         self.materials.color(&emitted.radiance, uv) * emitted.factor
     }
 
-    fn triangle(&self, instance: u32, triangle: u32, map: &DAffine3) -> [DVec3; 3] {
+    fn triangle(&self, instance: u32, triangle: u32, time: f32, map: &DAffine3) -> [DVec3; 3] {
         let Geometry::Mesh(mesh) = self.geometry.instances[instance as usize].geometry else {
             unreachable!("only meshes have triangles");
         };
-        let corners = self.geometry.meshes[mesh as usize].corners(triangle);
-        corners.map(|corner| map.transform_point3(corner.as_dvec3()))
+        let corners = self.geometry.meshes[mesh as usize].corners(triangle, time);
+        corners.map(|corner| map.transform_point3(corner))
     }
 
     fn sample_shape(
@@ -370,9 +370,10 @@ impl Lights<'_> {
         let object = &self.geometry.instances[instance as usize];
         let Geometry::Mesh(mesh) = object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(time);
-        let corners = self.triangle(instance, triangle, &map);
+        let corners = self.triangle(instance, triangle, time, &map);
         let weights = sample_triangle(from.p, corners, u);
-        let local = self.geometry.meshes[mesh as usize].surface(triangle, weights, object.needs_uv);
+        let local =
+            self.geometry.meshes[mesh as usize].surface(triangle, weights, time, object.needs_uv);
         let surface = SurfacePoint::new(&local, &map, &inverse);
         let pdf = triangle_pdf(from.p, corners, surface.p);
         self.surface_sample(instance, from, &surface, pdf)

@@ -7,11 +7,13 @@ use super::outline::Kind;
 use super::overrides::FIELDS;
 use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
+use super::waves::check_waves;
 use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::{
     Clock, Encoding, Filter, ImageData, RenderSettings, SceneDescription, Texture, TriangleMesh,
+    Waves,
 };
 use indexmap::IndexMap;
 use indexmap::map::Entry;
@@ -389,6 +391,13 @@ impl Assets<'_> {
             MeshFile::Triangles { positions, triangles, normals, uvs } => {
                 surface::check_triangles(cursor, positions, &triangles, normals, uvs, report)
                     .map(Arc::new)
+            }
+            MeshFile::Waves { size, cells, waves, steepness, gravity } => {
+                let waves = Waves { size, cells, steepness, gravity, waves };
+                let waves = check_waves(cursor, waves, report)?;
+                let rest = Arc::new(waves.at_rest());
+                scene.waves.insert(cursor.key(), waves);
+                Some(rest)
             }
             MeshFile::File(name) => {
                 let place = cursor.nth(0);

@@ -97,6 +97,19 @@ pub(super) const FILTER: Limits =
 /// Motion tolerance, as a share of the way.
 pub(super) const TOLERANCE: Limits =
     Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "" };
+/// Waves per second.
+pub(super) const FREQUENCY: Limits =
+    Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "periods per second" };
+/// Acceleration of a fall.
+pub(super) const GRAVITY: Limits = Limits {
+    min: 0.0,
+    max: 1e6,
+    open_min: true,
+    open_max: false,
+    unit: "metres per second squared",
+};
+/// Cells along one side of a grid.
+pub(super) const CELLS: Limits = closed(1.0, 65_536.0, "cells");
 /// Edge of a checker's field.
 pub(super) const UV_LENGTH: Limits = closed(1e-9, 1e15, "in units of uv");
 /// Texture coordinates.

@@ -37,6 +37,7 @@ mod traverse;
 
 pub use boxes::BoxTree;
 pub use moving::MovingTree;
+pub(super) use moving::segment_of;
 pub use traverse::TriangleHit;
 
 use crate::description::{BvhQuality, TriangleMesh};

@@ -146,7 +146,7 @@ impl MovingTree {
 /// Which of `count` equal segments of `[0, 1]` a time lies in, and where, in `[0, 1]`; the end of all is
 /// the end of the last.
 #[inline]
-pub(super) fn segment_of(time: f32, count: usize) -> (usize, f32) {
+pub(in super::super) fn segment_of(time: f32, count: usize) -> (usize, f32) {
     let place = time.clamp(0.0, 1.0) * count as f32;
     let index = (place as usize).min(count.saturating_sub(1));
     (index, place - index as f32)
