@@ -327,3 +327,50 @@ fn object_ids(objects: &ObjectQuery) -> EntityHashMap<u32> {
     by_name.sort_unstable_by_key(|(name, entity)| (*name, spawn_order(*entity)));
     by_name.into_iter().zip(1..).map(|((_, entity), id)| (entity, id)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Simulation;
+    use crate::world::{Camera, Transform};
+
+    const OBJECTS: usize = 20;
+
+    /// A world with a camera and then spheres at these places.
+    fn world_of(places: &[Transform]) -> (Simulation, Vec<Entity>) {
+        let mut simulation = Simulation::new();
+        let world = simulation.world_mut();
+        let mut entities = vec![world.spawn((Camera::default(), places[0])).id()];
+        let sphere = |place: &Transform| (Shape::Sphere { radius: 0.3 }, *place);
+        entities.extend(places[1..].iter().map(|place| world.spawn(sphere(place)).id()));
+        simulation.prepare_frame(0).expect("a camera");
+        (simulation, entities)
+    }
+
+    /// Oracle: a new world in the same state has the same table. One sphere moves, becomes flat, comes
+    /// back, the camera moves, nothing moves: of all that only what must be is written.
+    #[test]
+    fn what_is_written_in_place_is_what_a_new_world_gets() {
+        let at = |x: f64| Transform { translation: DVec3::new(x, 0.1, -5.0), ..Default::default() };
+        let mut places: Vec<Transform> = (0..=OBJECTS).map(|k| at(k as f64)).collect();
+        let (mut old, entities) = world_of(&places);
+        let mut change = |index: usize, place: Transform| {
+            if places[index] != place {
+                places[index] = place;
+                *old.world_mut().get_mut::<Transform>(entities[index]).expect("placed") = place;
+            }
+            old.prepare_frame(0).expect("a camera");
+            let (new, _) = world_of(&places);
+            let table = old.world().resource::<Instances>();
+            assert_eq!(table.list, new.world().resource::<Instances>().list);
+            (table.rewritten_slots.clone(), table.restructured)
+        };
+        let all: Vec<u32> = (0..OBJECTS as u32).collect();
+        assert_eq!(change(4, at(-7.3)), (vec![3], false));
+        assert_eq!(change(4, at(-7.3)), (vec![], false), "nothing moved");
+        let flat = Transform { scale: DVec3::new(1.0, 0.0, 1.0), ..at(2.0) };
+        assert_eq!(change(9, flat), (all[1..].iter().map(|k| k - 1).collect(), true));
+        assert_eq!(change(9, at(2.0)), (all.clone(), true));
+        assert_eq!(change(0, at(0.37)), (all, false), "the camera moved");
+    }
+}
