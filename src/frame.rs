@@ -360,7 +360,17 @@ impl Simulation {
     fn table_bytes(&self) -> Vec<(&'static str, u64)> {
         let instances = self.world.resource::<Instances>().list.capacity() * size_of::<Instance>();
         let lights = self.world.resource::<LightTable>().memory();
-        vec![("instances", instances as u64), ("light table", lights as u64)]
+        let trees: usize =
+            self.world.resource::<MeshTrees>().list.iter().map(|tree| tree.memory()).sum();
+        let resting = self.world.resource::<RestingTree>().memory();
+        let top = self.world.resource::<TopLevel>().memory();
+        vec![
+            ("instances", instances as u64),
+            ("mesh trees", trees as u64),
+            ("tree of resting meshes", resting as u64),
+            ("top level", top as u64),
+            ("light table", lights as u64),
+        ]
     }
 
     /// The integrator which the settings ask for, and for `Auto` why it is taken.

@@ -67,6 +67,11 @@ impl RestingTree {
         Some(self.members[k].0)
     }
 
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        self.tree.as_ref().map_or(0, |tree| tree.memory())
+    }
+
     /// Instance and triangle of its mesh of a triangle of the shared tree.
     #[inline]
     pub(super) fn owner(&self, triangle: u32) -> (u32, u32) {

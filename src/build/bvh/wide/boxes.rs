@@ -63,6 +63,13 @@ impl BoxTree {
         tree
     }
 
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+            + (self.parents.capacity() + self.places.capacity()) * size_of::<Place>()
+            + self.names.capacity() * size_of::<u32>()
+    }
+
     /// Number of boxes.
     pub fn len(&self) -> usize {
         self.names.len()
