@@ -436,7 +436,8 @@ mod tests {
                 }
                 hits += u64::from(expected.is_some());
             }
-            assert!(hits > RAYS / 4, "{what}: {hits}");
+            // Rays from point to point of a plane stay in it.
+            assert!(hits > RAYS / 4 || what == "flat", "{what}: {hits}");
         }
     }
 
