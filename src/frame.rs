@@ -463,9 +463,10 @@ mod tests {
         let frame = simulation.render_frame(0, &RenderControl::default()).expect("a camera");
         let FrameReport { system_seconds, stage_seconds, .. } = frame.report;
         let names: Vec<&str> = system_seconds.iter().map(|(name, _)| *name).collect();
-        let extract = ["camera", "surfaces", "emissions", "instances", "lights", "requirements"];
-        let build = ["mesh trees", "top level", "light table"];
-        assert_eq!(names, [&["poses"][..], &extract, &build].concat());
+        let step = ["poses", "deformation"];
+        let extract = ["camera", "surfaces", "emissions", "instances", "resting meshes", "lights"];
+        let build = ["tree of resting meshes", "mesh trees", "top level", "light table"];
+        assert_eq!(names, [&step[..], &extract, &["requirements"], &build].concat());
         let sum = |list: &[(&str, f64)]| list.iter().map(|(_, seconds)| seconds).sum::<f64>();
         assert!(sum(&system_seconds) > 0.0 && sum(&system_seconds) < sum(&stage_seconds[..3]));
     }
