@@ -6,6 +6,7 @@ mod diagnostic;
 mod light;
 mod material;
 mod motion;
+mod photons;
 mod read;
 mod scene;
 mod settings;
@@ -22,6 +23,7 @@ pub use motion::{
 };
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
+pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use settings::{Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};

@@ -1,5 +1,6 @@
 //! The clock and the settings of a render.
 
+use super::{Caustics, PhotonSettings};
 use serde::{Deserialize, Serialize};
 
 /// The frames of a scene and when they are taken.
@@ -39,6 +40,13 @@ pub struct RenderSettings {
     pub roulette_depth: u32,
     /// How light is simulated.
     pub integrator: IntegratorChoice,
+    /// Where caustics come from with the integrator `Path`.
+    pub caustics: Caustics,
+    /// How photons are traced and gathered.
+    pub photons: PhotonSettings,
+    /// Rays which gather indirect light at the first diffuse surface, with the integrator
+    /// `PhotonMap`; 0 reads it from the photons there. Trades time for blotches (bias).
+    pub final_gather: u32,
     /// Seed of every random decision.
     pub seed: u64,
     /// The pixel filter.
@@ -67,6 +75,9 @@ impl Default for RenderSettings {
             max_depth: 1000,
             roulette_depth: 4,
             integrator: IntegratorChoice::Auto,
+            caustics: Caustics::default(),
+            photons: PhotonSettings::default(),
+            final_gather: 0,
             seed: 0,
             filter: Filter::default(),
             clamp_indirect: None,
@@ -87,6 +98,10 @@ pub enum IntegratorChoice {
     Auto,
     /// Unidirectional path tracing.
     Path,
+    /// Photon mapping in two passes: photons, then the picture.
+    PhotonMap,
+    /// Stochastic progressive photon mapping.
+    Sppm,
 }
 
 /// Pixel filters, in pixels; sampled by importance, so that each sample has weight 1.

@@ -8,6 +8,7 @@
 mod camera;
 mod instances;
 mod lights;
+mod method;
 mod requirements;
 mod surfaces;
 
@@ -16,6 +17,7 @@ pub use instances::{
     Geometry, Instance, Instances, Meshes, NOTHING, extract_instances, extract_meshes,
 };
 pub use lights::{PunctualLight, PunctualLights, extract_lights};
+pub use method::{ChosenIntegrator, Method, choose_integrator};
 pub use requirements::{Feature, Requirements, derive_requirements};
 pub use surfaces::{SurfaceEmission, SurfaceSlots, Surfaces, extract_surfaces};
 
@@ -32,6 +34,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(SurfaceSlots::default());
     world.insert_resource(PunctualLights::default());
     world.insert_resource(Requirements::default());
+    world.insert_resource(ChosenIntegrator::default());
     frame.add_systems(
         (
             extract_camera,
@@ -40,6 +43,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
             extract_instances,
             extract_lights,
             derive_requirements,
+            choose_integrator,
         )
             .chain()
             .in_set(FrameSystems::Extract),

@@ -2,7 +2,7 @@
 
 use super::{Instances, PunctualLights, Surfaces, ViewCamera};
 use crate::description::Light;
-use crate::world::{Name, Shape, ShutterMotion};
+use crate::world::{Name, Settings, Shape, ShutterMotion};
 use bevy_ecs::prelude::*;
 
 /// Something that a scene may require.
@@ -29,8 +29,6 @@ pub enum Feature {
 pub struct Requirements {
     /// Each feature once, with what asks for it.
     pub features: Vec<(Feature, String)>,
-    /// What the integrator cannot find, in words for the user.
-    pub warnings: Vec<String>,
 }
 
 impl Requirements {
@@ -46,6 +44,7 @@ pub fn derive_requirements(
     surfaces: Res<Surfaces>,
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
+    settings: Res<Settings>,
     named: Query<(&Name, &ShutterMotion), With<Shape>>,
     mut requirements: ResMut<Requirements>,
 ) {
@@ -85,26 +84,11 @@ pub fn derive_requirements(
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
     }
-    let middle = glam::Vec2::splat(0.5);
-    let specular = used(&|m| !surfaces.materials.bsdf(m, middle, &mut 0.5).has_non_delta());
-    if specular > 0 {
-        require(Feature::Caustics, format!("{specular} mirrors or clear solids"));
-        let points = lights
-            .0
-            .iter()
-            .filter(|l| match l.light {
-                Light::Point { .. } | Light::Spot { .. } => true,
-                Light::Directional { angle, .. } => angle == 0.0,
-                Light::Sky { .. } => false,
-            })
-            .count();
-        if points > 0 {
-            found.warnings.push(format!(
-                "paths from {points} point-like lights over mirrors or through glass are out of \
-                 reach of `Path`: their caustics and what stands behind glass stay dark; give the \
-                 light a size (a small emitting sphere, an angle)"
-            ));
-        }
+    let min_alpha = settings.0.photons.min_alpha();
+    let specular = used(&|m| surfaces.materials.may_cast_caustics(m, min_alpha));
+    let storable = used(&|m| surfaces.materials.may_be_storable(m, min_alpha));
+    if specular > 0 && storable > 0 {
+        require(Feature::Caustics, format!("{specular} mirrors, clear or polished objects"));
     }
     requirements.set_if_neq(found);
 }

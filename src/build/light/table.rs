@@ -50,6 +50,11 @@ pub struct LightTable {
     pub(super) emitters: Vec<Emitter>,
     /// How one of them is chosen.
     pub(super) choice: LightChoice,
+    /// Flux of each emitter which has a place, luminance, W.
+    pub(super) near_flux: Vec<f64>,
+    /// For each emitter infinitely far away the irradiance of a plane which faces it, or of a sky
+    /// from all around, luminance, W·m⁻².
+    pub(super) far_irradiance: Vec<f64>,
     /// First emitter of each instance, or [`NOTHING`].
     pub(super) first_of_instance: Vec<u32>,
     /// Emitter of each light without a shape.
@@ -217,7 +222,8 @@ impl Builder {
 
     fn finish(self) -> LightTable {
         let choice = LightChoice::new(&self.near, &self.far);
-        LightTable { choice, built: true, ..self.table }
+        let near_flux = self.near.iter().map(|light| light.flux).collect();
+        LightTable { choice, near_flux, far_irradiance: self.far, built: true, ..self.table }
     }
 }
 
