@@ -83,14 +83,18 @@ fn light_through_flat_water_is_the_closed_form() {
     for settings in [
         "integrator: Path",
         "integrator: Path, caustics: Photons, photons: (per_pass: Some(8192))",
-        "integrator: Sppm, photons: (per_pass: Some(8192))",
-        "integrator: PhotonMap, final_gather: 4, photons: (per_pass: Some(65536))",
+        "integrator: Sppm, photons: (per_pass: Some(65536))",
+        "integrator: PhotonMap, final_gather: 4, photons: (per_pass: Some(524288))",
     ] {
-        let description = described(WATER, settings, (12, 12), 32);
+        let description = described(WATER, settings, (12, 12), 16);
         // away from the mirrors, where disks are cut off
-        let mean = mean_over(&seeds(&description, 4), |x, y| (3..9).contains(&x) && (3..9).contains(&y));
+        let mean =
+            mean_over(&seeds(&description, 4), |x, y| (3..9).contains(&x) && (3..9).contains(&y));
         let difference = mean.mean - expected;
-        assert!(difference.abs() < 4.0 * mean.error + 3e-3 * expected, "{settings}: {mean:?}, {expected}");
+        assert!(
+            difference.abs() < 4.0 * mean.error + 3e-3 * expected,
+            "{settings}: {mean:?}, {expected}"
+        );
         assert!(mean.error < 0.015 * expected, "{settings}: {mean:?}");
     }
 }
@@ -104,7 +108,7 @@ const BALLS: &str = r#"(
         "box": (transform: (translation: (0, 1, 0)), shape: Box(size: (3, 2, 6)), material: "white"),
         "mirror": (transform: (translation: (-0.6, 0.45, -0.4)), shape: Sphere(radius: 0.4), material: "mirror"),
         "glass": (transform: (translation: (0.6, 0.5, 0.2)), shape: Sphere(radius: 0.4), material: "glass" MOTION),
-        "lamp": (transform: (translation: (0.2, 1.98, 0), rotation: (90, 0, 0)), shape: Rectangle(size: (0.5, 0.5)), emission: Radiance((10, 10, 10))),
+        "lamp": (transform: (translation: (0.2, 1.98, 0), rotation: (90, 0, 0)), shape: Rectangle(size: (1, 1)), emission: Radiance((3, 3, 3))),
     })"#;
 
 /// Mean squared difference of the mean of several pictures to a reference, over blocks of pixels.
@@ -123,7 +127,7 @@ fn error(pictures: &[Picture], reference: &[f64]) -> f64 {
 const METHODS: [&str; 3] = [
     "integrator: Sppm, photons: (per_pass: Some(8192))",
     "integrator: Path, caustics: Photons, photons: (per_pass: Some(2048))",
-    "integrator: PhotonMap, final_gather: 8, photons: (per_pass: Some(100000), nearest: 50)",
+    "integrator: PhotonMap, final_gather: 8, photons: (per_pass: Some(30000), nearest: 50)",
 ];
 
 /// Reference: path tracing with many samples. The progressive methods come nearer to it from pass to
@@ -132,15 +136,16 @@ const METHODS: [&str; 3] = [
 #[test]
 fn all_methods_converge_to_the_same_picture() {
     let text = BALLS.replace("MOTION", "");
-    let reference = described(&text, "integrator: Path", (20, 16), 8192);
+    let reference = described(&text, "integrator: Path", (20, 16), 4096);
     let reference = render_description(&reference, 0).green();
     for method in &METHODS[..2] {
-        let at = |samples| error(&seeds(&described(&text, method, (20, 16), samples), 3), &reference);
-        let errors = [at(4), at(32), at(256)];
+        let at =
+            |samples| error(&seeds(&described(&text, method, (20, 16), samples), 2), &reference);
+        let errors = [at(4), at(16), at(256)];
         println!("{method}: {errors:?}");
         let slope = (errors[2] / errors[0]).ln() / 64.0_f64.ln();
         assert!(slope < -0.4, "{method}: {errors:?}, slope {slope}");
-        assert!(errors[2] < 2e-3, "{method}: {errors:?}");
+        assert!(errors[2] < 4e-3, "{method}: {errors:?}");
     }
     let map = error(&seeds(&described(&text, METHODS[2], (20, 16), 16), 2), &reference);
     println!("{map}");
@@ -152,7 +157,7 @@ fn all_methods_converge_to_the_same_picture() {
 #[test]
 fn a_moving_glass_ball_agrees_with_path_tracing() {
     let text = BALLS.replace("MOTION", ", velocity: (linear: (-12, 0, 0))");
-    let reference = described(&text, "integrator: Path", (20, 16), 4096);
+    let reference = described(&text, "integrator: Path", (20, 16), 2048);
     let reference = render_description(&reference, 0);
     for method in METHODS {
         let pictures = seeds(&described(&text, method, (20, 16), 64), 4);

@@ -6,7 +6,9 @@ use common::scene;
 use glam::{DVec3, Vec3};
 use kinora::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
 use kinora::build::light::{Aim, LightTable, Lights, PhotonNumbers, PhotonSource};
-use kinora::build::photon::{Keep, Photon, PhotonMap, PhotonPass, PhotonStore, PhotonTracer, QueryPoint};
+use kinora::build::photon::{
+    Keep, Photon, PhotonMap, PhotonPass, PhotonStore, PhotonTracer, QueryPoint,
+};
 use kinora::description::Kernel;
 use kinora::extract::{FrameOrigin, Instances, PunctualLights, Surfaces};
 use kinora::frame::Simulation;
@@ -31,7 +33,11 @@ impl Tables {
 
     fn geometry(&self) -> SceneGeometry<'_> {
         let (instances, meshes) = (self.get::<Instances>(), self.get::<MeshTrees>());
-        SceneGeometry { instances: &instances.list, meshes: &meshes.list, top: self.get::<TopLevel>() }
+        SceneGeometry {
+            instances: &instances.list,
+            meshes: &meshes.list,
+            top: self.get::<TopLevel>(),
+        }
     }
 
     fn lights(&self) -> Lights<'_> {
@@ -83,7 +89,8 @@ fn numbers(k: u32) -> PhotonNumbers {
     PhotonNumbers { light: s.one_fine(0), point: s.two(1), direction: s.two(3), aim: s.one(5) }
 }
 
-const CAMERA: &str = r#""camera": (transform: (translation: (0, 3, 9), look_at: (0, 0, 0)), camera: ())"#;
+const CAMERA: &str =
+    r#""camera": (transform: (translation: (0, 3, 9), look_at: (0, 0, 0)), camera: ())"#;
 
 /// Oracles: the flux of each light in closed form; for those far away, through the disk of the sphere
 /// around a ball of radius 1 (its box has the half diagonal √3).
@@ -93,8 +100,16 @@ fn emitted_photons_carry_the_flux_of_every_light() {
     let lights = [
         ("sphere", r#"shape: Sphere(radius: 0.5), emission: Radiance((3, 3, 3))"#, 29.608_813_2),
         ("disk", r#"shape: Disk(radius: 0.5), emission: Radiance((3, 3, 3))"#, 7.402_203_3),
-        ("rectangle", r#"shape: Rectangle(size: (2, 1)), emission: Radiance((3, 3, 3))"#, 18.849_555_9),
-        ("two sides", r#"shape: Disk(radius: 0.5), two_sided: true, emission: Radiance((3, 3, 3))"#, 14.804_406_6),
+        (
+            "rectangle",
+            r#"shape: Rectangle(size: (2, 1)), emission: Radiance((3, 3, 3))"#,
+            18.849_555_9,
+        ),
+        (
+            "two sides",
+            r#"shape: Disk(radius: 0.5), two_sided: true, emission: Radiance((3, 3, 3))"#,
+            14.804_406_6,
+        ),
         ("power", r#"shape: Cone(), emission: Power((7, 7, 7))"#, 7.0),
         ("texture", r#"shape: Rectangle(size: (2, 1)), emission: Radiance("checks")"#, PI),
         ("stretched", r#"shape: Sphere(), emission: Power((5, 5, 5))"#, 5.0),
@@ -148,7 +163,8 @@ fn aiming_changes_how_many_photons_hit_but_not_their_flux() {
         ));
         let balls = [(DVec3::new(0.0, -2.0, 0.0), 0.5), (DVec3::new(0.6, -2.0, 0.3), 0.3)];
         let balls = balls.map(|(c, r)| (tables.local(c).as_dvec3(), r));
-        let boxes = balls.map(|(c, r)| Aabb { min: c.as_vec3() - r as f32, max: c.as_vec3() + r as f32 });
+        let boxes =
+            balls.map(|(c, r)| Aabb { min: c.as_vec3() - r as f32, max: c.as_vec3() + r as f32 });
         let aim = Aim::new(&boxes).expect("bounded");
         let (source, lights) = (tables.source(), tables.lights());
         let hits = |photon: &kinora::build::light::EmittedPhoton| {
@@ -198,7 +214,10 @@ fn irradiance_under_a_disk_and_a_point_is_the_closed_form() {
         for &(x, r, expected) in points {
             let (e, error) = irradiance(&tables, &store, DVec3::new(x, 0.0, 0.0), r);
             assert!(error < 0.03 * expected, "{light} at {x}: error {error} of {e}");
-            assert!((e - expected).abs() < 4.0 * error, "{light} at {x}: {e} ± {error}, {expected}");
+            assert!(
+                (e - expected).abs() < 4.0 * error,
+                "{light} at {x}: {e} ± {error}, {expected}"
+            );
         }
     };
     of(
@@ -218,8 +237,14 @@ fn irradiance_under_a_disk_and_a_point_is_the_closed_form() {
 fn a_closed_sphere_receives_the_albedo_series() {
     for (rho, depth, factor) in [(0.6, 1000, 2.5), (0.95, 1000, 20.0), (0.6, 3, 1.96)] {
         for (light, flux) in [
-            (r#""lamp": (transform: (translation: (0.5, 0.2, 0)), light: Point(power: Some((2, 2, 2))))"#, 2.0),
-            (r#""lamp": (transform: (translation: (0.4, 0, 0)), shape: Sphere(radius: 0.1), material: "white", emission: Power((3, 3, 3)))"#, 3.0),
+            (
+                r#""lamp": (transform: (translation: (0.5, 0.2, 0)), light: Point(power: Some((2, 2, 2))))"#,
+                2.0,
+            ),
+            (
+                r#""lamp": (transform: (translation: (0.4, 0, 0)), shape: Sphere(radius: 0.1), material: "white", emission: Power((3, 3, 3)))"#,
+                3.0,
+            ),
         ] {
             let tables = Tables::new(&format!(
                 r#"(materials: {{"wall": Diffuse(albedo: {rho}), "white": Mirror()}}, entities: {{

@@ -21,9 +21,9 @@ pub use material::{Attenuation, Material, Metal};
 pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
+pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
-pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use settings::{Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};

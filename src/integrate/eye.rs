@@ -248,8 +248,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
             .then(|| scene.surfaces.materials.bsdf(material, surface.uv, &mut lobe));
         if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
             let ray = &walk.ray;
-            let first =
-                self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());
+            let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());
             context.sample.first_hit = Some(first);
         }
         let Some(bsdf) = bsdf else { return false };
@@ -476,13 +475,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         query
     }
 
-    fn gather(
-        &self,
-        map: &PhotonMap,
-        walk: &Walk,
-        vertex: &Vertex,
-        context: &mut Context,
-    ) -> Rgb {
+    fn gather(&self, map: &PhotonMap, walk: &Walk, vertex: &Vertex, context: &mut Context) -> Rgb {
         if map.is_empty() {
             return Rgb::ZERO;
         }

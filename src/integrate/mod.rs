@@ -25,10 +25,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(PhotonScratch::default());
     let with_photons = |chosen: Res<ChosenIntegrator>| chosen.method.has_photons();
     frame.add_systems(
-        (
-            render_film.run_if(not(with_photons)),
-            render_film_with_photons.run_if(with_photons),
-        )
+        (render_film.run_if(not(with_photons)), render_film_with_photons.run_if(with_photons))
             .chain()
             .in_set(FrameSystems::Integrate),
     );

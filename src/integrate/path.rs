@@ -251,7 +251,13 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
 
     /// The material of the solid in which a path goes on from a vertex in the direction `wi`, when it
     /// arrived inside `inside`; [`NOTHING`] outside.
-    pub(super) fn medium_towards(&self, wi: Vec3, vertex: &Vertex, material: u32, inside: u32) -> u32 {
+    pub(super) fn medium_towards(
+        &self,
+        wi: Vec3,
+        vertex: &Vertex,
+        material: u32,
+        inside: u32,
+    ) -> u32 {
         if !vertex.crosses(wi) || !self.scene.surfaces.materials.is_dielectric(material) {
             return inside;
         }

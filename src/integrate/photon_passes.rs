@@ -229,7 +229,8 @@ impl<'a> Setting<'a> {
     fn plan<const O: bool, const A: bool>(&self, scratch: &mut PhotonScratch) -> PhotonReport {
         let settings = self.job.settings;
         let asked = settings.photons.emitted(settings.size);
-        let pilot = PhotonPass { emitted: PILOT.min(asked), ..self.photon_pass(u32::MAX, asked, 0.5) };
+        let pilot =
+            PhotonPass { emitted: PILOT.min(asked), ..self.photon_pass(u32::MAX, asked, 0.5) };
         let keeps = [self.global_keep(), self.has_caustic_map().then_some(Keep::Caustics)];
         let mut kept: u64 = 0;
         for keep in keeps.into_iter().flatten() {
@@ -277,19 +278,20 @@ impl<'a> Setting<'a> {
         report: &mut PhotonReport,
     ) -> Option<()> {
         let cancel = &self.job.control.cancel;
-        let mut take = |keep: Keep, store: &mut PhotonStore, map: &mut PhotonMap, wanted: Wanted| {
-            let start = Instant::now();
-            let counters: PhotonCounters =
-                self.tracer::<O, A>(keep).trace_pass(pass, store, cancel)?;
-            let traced = Instant::now();
-            map.rebuild(store, |photon| wanted == Wanted::All || !photon.caustic);
-            report.trace_seconds += (traced - start).as_secs_f64();
-            report.build_seconds += traced.elapsed().as_secs_f64();
-            report.emitted += counters.emitted;
-            report.stored += counters.stored;
-            self.job.control.rays.fetch_add(counters.rays, Relaxed);
-            Some(map.len() as u64)
-        };
+        let mut take =
+            |keep: Keep, store: &mut PhotonStore, map: &mut PhotonMap, wanted: Wanted| {
+                let start = Instant::now();
+                let counters: PhotonCounters =
+                    self.tracer::<O, A>(keep).trace_pass(pass, store, cancel)?;
+                let traced = Instant::now();
+                map.rebuild(store, |photon| wanted == Wanted::All || !photon.caustic);
+                report.trace_seconds += (traced - start).as_secs_f64();
+                report.build_seconds += traced.elapsed().as_secs_f64();
+                report.emitted += counters.emitted;
+                report.stored += counters.stored;
+                self.job.control.rays.fetch_add(counters.rays, Relaxed);
+                Some(map.len() as u64)
+            };
         if let Some(keep) = self.global_keep() {
             // Without a final gathering the caustics are read from their own map.
             let direct = self.method == Method::PhotonMap && keep == Keep::Indirect;
@@ -414,12 +416,12 @@ impl TileState {
                 return None;
             }
             let radius = pixels.next().expect("one for each pixel of the tile");
-            let key = SampleKey { seed: settings.seed, frame: job.frame, pixel: (x, y), index: pass };
+            let key =
+                SampleKey { seed: settings.seed, frame: job.frame, pixel: (x, y), index: pass };
             let sampler = key.sampler();
             let offset = job.filter.sample(sampler.two(dimension::FILM));
             let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-            let lens =
-                if job.has_lens { sampler.two(dimension::LENS) } else { Vec2::splat(0.5) };
+            let lens = if job.has_lens { sampler.two(dimension::LENS) } else { Vec2::splat(0.5) };
             let ray = tracer.path.scene.camera.ray(centre + offset.as_dvec2(), lens, time);
             let scale = match setting.method {
                 Method::Sppm => radius.scale(),

@@ -152,9 +152,10 @@ impl Aim {
         }
         let disk = (square_to_disk(u).as_dvec2() * chosen.radius).extend(0.0).as_vec3();
         let p = on_plane(chosen.center) + on_plane(Frame::from_z(d).from_local(disk).as_dvec3());
-        let shadows = self.spheres.iter().filter(|s| {
-            (on_plane(s.center) - p).length_squared() <= s.radius * s.radius
-        });
+        let shadows = self
+            .spheres
+            .iter()
+            .filter(|s| (on_plane(s.center) - p).length_squared() <= s.radius * s.radius);
         (p, shadows.count().max(1) as f64 / (PI * total))
     }
 }

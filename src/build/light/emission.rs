@@ -92,8 +92,8 @@ impl PhotonSource {
         // What a light emits may overflow when it is multiplied by a huge disk.
         let fluxes: Vec<f64> = fluxes.map(|f| if f.is_finite() { f } else { f64::MAX }).collect();
         let greatest = fluxes.iter().copied().fold(0.0, f64::max);
-        let choice = (greatest > 0.0)
-            .then(|| Piecewise1D::new(fluxes.iter().map(|flux| flux / greatest)));
+        let choice =
+            (greatest > 0.0).then(|| Piecewise1D::new(fluxes.iter().map(|flux| flux / greatest)));
         Self { choice, reach, flux: fluxes.iter().sum() }
     }
 

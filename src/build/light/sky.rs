@@ -102,11 +102,7 @@ impl SkyLight {
 
     /// Draws a direction towards the sky for no receiver in particular, and its density per unit
     /// solid angle: evenly over the sphere for a constant sky, by the map otherwise.
-    pub fn sample_all_around(
-        &self,
-        u: Vec2,
-        render_from_light: &DAffine3,
-    ) -> Option<(Vec3, f32)> {
+    pub fn sample_all_around(&self, u: Vec2, render_from_light: &DAffine3) -> Option<(Vec3, f32)> {
         match &self.map {
             None => Some((uniform_sphere(u), 1.0 / (2.0 * TAU))),
             Some(_) => self.sample(Vec3::Z, u, render_from_light),

@@ -172,9 +172,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSO
             Some(counters)
         };
         let chunks = store.chunks.par_iter_mut().enumerate().map(|(k, c)| (k as u32, c));
-        chunks
-            .map(trace_chunk)
-            .try_reduce(PhotonCounters::default, |a, b| Some(a.plus(b)))
+        chunks.map(trace_chunk).try_reduce(PhotonCounters::default, |a, b| Some(a.plus(b)))
     }
 
     /// Follows one photon.

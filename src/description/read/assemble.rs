@@ -11,7 +11,8 @@ use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::{
-    Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription, Texture, TriangleMesh,
+    Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription, Texture,
+    TriangleMesh,
 };
 use indexmap::IndexMap;
 use indexmap::map::Entry;
