@@ -210,3 +210,32 @@ fn empty_cases_are_ordinary() {
         }
     }
 }
+
+/// Frames of a still camera: where nothing changes, two frames differ by their noise and no more, whose
+/// variance the film states; a ball which moves on the other side does not make the light flicker here.
+#[test]
+fn frames_differ_by_the_stated_noise_where_nothing_changes() {
+    let moving = BALLS.replace("MOTION", ", velocity: (linear: (-0.5, 0, 0))");
+    for text in [BALLS.replace("MOTION", ""), moving] {
+        for method in &METHODS[..2] {
+            let description = described(&text, method, (20, 16), 32);
+            let frames: Vec<Picture> =
+                (0..4).map(|k| render_description(&description, k)).collect();
+            // The left third, away from the balls' path and shadow, upper half.
+            let chosen = |k: usize| k % 20 < 6 && k / 20 < 8;
+            let (mut squares, mut stated) = (0.0, 0.0);
+            for pair in frames.windows(2) {
+                let (a, b) = (pair[0].green(), pair[1].green());
+                let (va, vb) = (pair[0].variance(), pair[1].variance());
+                for k in (0..a.len()).filter(|&k| chosen(k)) {
+                    squares += (a[k] - b[k]).powi(2);
+                    stated += va[k] + vb[k];
+                }
+            }
+            // Low-discrepancy points make less noise than their spread tells.
+            let ratio = squares / stated;
+            println!("{method}: {ratio}");
+            assert!((0.02..1.5).contains(&ratio), "{method}: {ratio} of the stated variance");
+        }
+    }
+}

@@ -50,7 +50,7 @@ pub struct PhotonScratch {
 }
 
 /// What the photons of a frame came to.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct PhotonReport {
     /// Photons emitted in each pass.
     pub per_pass: u32,
@@ -76,6 +76,27 @@ pub struct PhotonReport {
     pub build_seconds: f64,
     /// Seconds of camera paths.
     pub gather_seconds: f64,
+}
+
+impl PhotonReport {
+    /// That of two frames together: sums, and the greatest of what is held at once.
+    #[must_use]
+    pub fn plus(self, other: &Self) -> Self {
+        Self {
+            per_pass: self.per_pass.max(other.per_pass),
+            emitted: self.emitted + other.emitted,
+            stored: self.stored + other.stored,
+            global: self.global.max(other.global),
+            caustics: self.caustics.max(other.caustics),
+            radii: (self.radii.0.min(other.radii.0), self.radii.1.max(other.radii.1)),
+            unresolved: self.unresolved + other.unresolved,
+            memory_bytes: self.memory_bytes.max(other.memory_bytes),
+            forecast_bytes: self.forecast_bytes.max(other.forecast_bytes),
+            trace_seconds: self.trace_seconds + other.trace_seconds,
+            build_seconds: self.build_seconds + other.build_seconds,
+            gather_seconds: self.gather_seconds + other.gather_seconds,
+        }
+    }
 }
 
 /// A tile over all passes.

@@ -81,7 +81,7 @@ impl PhotonMap {
     /// Builds the map anew over those photons of `store` which `keep` chooses.
     pub fn rebuild(&mut self, store: &PhotonStore, keep: impl Fn(&Photon) -> bool) {
         self.unsorted.clear();
-        for chunk in store.chunks() {
+        for chunk in &store.chunks {
             self.unsorted.extend(chunk.iter().filter(|photon| keep(photon)));
         }
         let unsorted = &self.unsorted;

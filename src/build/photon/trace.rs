@@ -95,13 +95,21 @@ impl PhotonCounters {
 /// memory is kept from pass to pass.
 #[derive(Clone, Debug, Default)]
 pub struct PhotonStore {
-    chunks: Vec<Vec<Photon>>,
+    pub(super) chunks: Vec<Vec<Photon>>,
 }
 
 impl PhotonStore {
     /// The photons in order.
     pub fn iter(&self) -> impl Iterator<Item = &Photon> {
         self.chunks.iter().flatten()
+    }
+
+    /// Adds a photon at the end.
+    pub fn push(&mut self, photon: Photon) {
+        if self.chunks.is_empty() {
+            self.chunks.push(Vec::new());
+        }
+        self.chunks.last_mut().expect("there is one").push(photon);
     }
 
     /// How many.
@@ -117,11 +125,6 @@ impl PhotonStore {
     /// Bytes held.
     pub fn memory(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.capacity() * size_of::<Photon>()).sum()
-    }
-
-    /// The lists.
-    pub(super) fn chunks(&self) -> &[Vec<Photon>] {
-        &self.chunks
     }
 }
 
