@@ -5,6 +5,7 @@ mod common;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::Vec3;
 use kinora::build::bvh::{MeshTree, MeshTrees, SceneGeometry, TopLevel};
+use kinora::description::BvhQuality;
 use kinora::extract::Instances;
 use kinora::frame::Simulation;
 use std::hint::black_box;
@@ -20,7 +21,7 @@ fn mesh_tree(c: &mut Criterion) {
             let mesh = common::triangles_at(&points(count));
             group.throughput(Throughput::Elements(count as u64));
             group.bench_with_input(BenchmarkId::new(case, count), &mesh, |b, mesh| {
-                b.iter(|| MeshTree::build(black_box(mesh).clone()));
+                b.iter(|| MeshTree::build(black_box(mesh).clone(), BvhQuality::default()));
             });
         }
     }

@@ -6,8 +6,8 @@ use bevy_ecs::prelude::*;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
 use kinora::extract::{
-    derive_requirements, extract_camera, extract_instances, extract_lights, extract_meshes,
-    extract_surfaces,
+    derive_requirements, extract_camera, extract_emissions, extract_instances, extract_lights,
+    extract_meshes, extract_surfaces,
 };
 use kinora::frame::Simulation;
 use kinora::step::sample_shutter;
@@ -34,8 +34,18 @@ fn spheres(moving_one_in: usize) -> Simulation {
 /// The systems of the stage, in its order.
 fn stage() -> Schedule {
     let mut stage = Schedule::default();
-    let tables = (extract_camera, extract_surfaces, extract_meshes, extract_instances);
-    stage.add_systems((tables, extract_lights, derive_requirements).chain());
+    stage.add_systems(
+        (
+            extract_camera,
+            extract_surfaces,
+            extract_emissions,
+            extract_meshes,
+            extract_instances,
+            extract_lights,
+            derive_requirements,
+        )
+            .chain(),
+    );
     stage
 }
 

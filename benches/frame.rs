@@ -7,32 +7,63 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
 use kinora::description::{Attenuation, EmissionStrength, RenderSettings};
 use kinora::frame::{RenderControl, Simulation};
-use kinora::world::{Emission, MadeOf, Material, Settings, Shape, Velocity};
+use kinora::world::{Camera, Emission, MadeOf, Material, Settings, Shape, Velocity};
 use std::hint::black_box;
 
-/// The second frame and those after it, without the picture: what stands still costs nothing.
+/// A frame without its picture: what is done before the integration starts.
+///
+/// 10,000 instances of a mesh. `first` is a full build; then the frames after it in which nothing moves,
+/// one instance moves, all move, the camera moves.
 fn prepare(c: &mut Criterion) {
     let mut group = c.benchmark_group("frame/prepare");
-    let mesh = common::triangles_at(&common::scattered(10_000));
-    for (case, speed) in [("static", 0.0), ("moving", 1.0)] {
-        let mut simulation = common::world_of_instances(&mesh, &common::scattered(500), 0.05);
+    group.sample_size(20);
+    let mesh = common::triangles_at(&common::scattered(100));
+    let world = || common::world_of_instances(&mesh, &common::scattered(INSTANCES), 0.02);
+    group.bench_function("first", |b| {
+        b.iter_batched(
+            world,
+            |mut simulation| simulation.prepare_frame(0).expect("the world has a camera"),
+            criterion::BatchSize::PerIteration,
+        );
+    });
+    for (case, moving) in [("nothing_moves", 0), ("one_moves", 1), ("all_move", INSTANCES)] {
+        let mut simulation = world();
         let world = simulation.world_mut();
         let mut shapes = world.query_filtered::<Entity, With<Shape>>();
-        let shapes: Vec<Entity> = shapes.iter(world).collect();
+        let shapes: Vec<Entity> = shapes.iter(world).take(moving).collect();
         for shape in shapes {
-            let velocity = Velocity { linear: DVec3::X * speed, angular: DVec3::ZERO };
-            world.entity_mut(shape).insert(velocity);
+            world.entity_mut(shape).insert(velocity());
         }
-        simulation.prepare_frame(0).expect("the world has a camera");
-        let mut frame = 0;
-        group.bench_function(case, |b| {
-            b.iter(|| {
-                frame = (frame + 1) % 48;
-                simulation.prepare_frame(black_box(frame)).expect("the world has a camera");
-            });
-        });
+        next_frames(&mut group, case, simulation);
     }
+    let mut simulation = world();
+    let world = simulation.world_mut();
+    let camera = world.query_filtered::<Entity, With<Camera>>().single(world);
+    let camera = camera.expect("the world has one camera");
+    world.entity_mut(camera).insert(velocity());
+    next_frames(&mut group, "camera_moves", simulation);
     group.finish();
+}
+
+const INSTANCES: usize = 10_000;
+
+fn velocity() -> Velocity {
+    Velocity { linear: DVec3::X * 0.1, angular: DVec3::ZERO }
+}
+
+fn next_frames(
+    group: &mut criterion::BenchmarkGroup<'_, criterion::measurement::WallTime>,
+    case: &str,
+    mut simulation: Simulation,
+) {
+    simulation.prepare_frame(0).expect("the world has a camera");
+    let mut frame = 0;
+    group.bench_function(case, |b| {
+        b.iter(|| {
+            frame = (frame + 1) % 48;
+            simulation.prepare_frame(black_box(frame)).expect("the world has a camera");
+        });
+    });
 }
 
 /// A scene from its description to its picture, and its next frame.

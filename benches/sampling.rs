@@ -28,9 +28,8 @@ fn stream(c: &mut Criterion) {
                 let alone = sampler.one(at + dimension::LOBE)
                     + sampler.one(at + dimension::LIGHT)
                     + sampler.one(at + dimension::ROULETTE);
-                alone
-                    + sampler.two(at + dimension::DIRECTION).element_sum()
-                    + sampler.two(at + dimension::LIGHT_POINT).element_sum()
+                let (direction, point) = sampler.four(at + dimension::DIRECTION_AND_LIGHT_POINT);
+                alone + direction.element_sum() + point.element_sum()
             };
             (0..COUNT).map(vertex).sum::<f32>()
         });

@@ -1,9 +1,10 @@
 //! The stages of one frame, and [`Simulation`], which runs them.
 
-use crate::build::bvh::{MeshTrees, TopLevel};
+use crate::build::bvh::{MeshTrees, RestingTree, TopLevel};
 use crate::build::light::LightTable;
+use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
-use crate::extract::{ChosenIntegrator, Instances, Surfaces, ViewCamera};
+use crate::extract::{ChosenIntegrator, Emissions, Instance, Instances, Surfaces, ViewCamera};
 use crate::film::{Film, FilmError};
 use crate::integrate::{IntegrateStatus, PhotonReport};
 use crate::world::{Camera, FrameClock, Settings};
@@ -14,6 +15,7 @@ use bevy_ecs::schedule::{
 };
 use bevy_ecs::system::ScheduleSystem;
 use serde::Serialize;
+use std::collections::TryReserveError;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
@@ -52,8 +54,14 @@ pub struct FrameReport {
     pub frame: u32,
     /// Seconds spent in each stage, in order: `step`, `extract`, `build`, `integrate`.
     pub stage_seconds: Vec<(&'static str, f64)>,
+    /// Seconds spent in each system, in order: `poses` of the first stage; `camera`, `surfaces`,
+    /// `emissions`, `instances`, `lights` and `requirements` of the second; `mesh trees`, `top level` and
+    /// `light table` of the third.
+    pub system_seconds: Vec<(&'static str, f64)>,
     /// What was rebuilt, in words: `"instances: 3 of 10"`, `"top level"`, `"meshes: 1"`.
     pub rebuilt: Vec<String>,
+    /// Bytes held by the tables and trees of the scene, by name.
+    pub table_bytes: Vec<(&'static str, u64)>,
     /// Pixel samples taken.
     pub samples: u64,
     /// Rays traced, shadow rays included.
@@ -99,6 +107,14 @@ pub enum RenderError {
     /// The picture cannot be made.
     #[error(transparent)]
     Film(#[from] FilmError),
+    /// There is no memory for the trees over new meshes.
+    #[error("no memory for {megabytes} MB of trees over the triangles of the scene")]
+    TreeMemory {
+        /// What they would take.
+        megabytes: usize,
+        /// What the system answered.
+        source: TryReserveError,
+    },
     /// The shutter closes before it opens, or the rate is not positive.
     #[error("the clock cannot run: {0}")]
     Clock(String),
@@ -110,12 +126,28 @@ pub struct Simulation {
     schedule: Schedule,
 }
 
-/// When a stage began, written by the marker systems between the stages.
+/// When stages began and how long systems took, written by the marker systems between them.
 #[derive(Resource, Default)]
-struct StageClock(Vec<Instant>);
+pub(crate) struct StageClock {
+    stages: Vec<Instant>,
+    systems: Vec<(&'static str, f64)>,
+    last: Option<Instant>,
+}
 
 fn mark(mut clock: ResMut<StageClock>) {
-    clock.0.push(Instant::now());
+    let now = Instant::now();
+    clock.stages.push(now);
+    clock.last = Some(now);
+}
+
+/// A system which notes how long it has been since the last note, under the name of the system between.
+pub(crate) fn stamp(name: &'static str) -> impl FnMut(ResMut<StageClock>) {
+    move |mut clock: ResMut<StageClock>| {
+        let now = Instant::now();
+        let seconds = clock.last.map_or(0.0, |last| (now - last).as_secs_f64());
+        clock.systems.push((name, seconds));
+        clock.last = Some(now);
+    }
 }
 
 /// Markers before the first stage and after each one.
@@ -219,12 +251,21 @@ impl Simulation {
         control.rays.store(0, Relaxed);
         self.world.insert_resource(control.clone());
         self.world.resource_mut::<FrameClock>().frame = frame;
-        self.world.resource_mut::<StageClock>().0.clear();
+        let mut clock = self.world.resource_mut::<StageClock>();
+        clock.stages.clear();
+        clock.systems.clear();
         self.check_systems()?;
         self.schedule.run(&mut self.world);
         self.world.clear_trackers();
         if let Some(first) = self.dangling() {
+            self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::Dangling(first));
+        }
+        let memory = self.world.resource::<TreeMemory>();
+        if let Some(source) = memory.refused.clone() {
+            let megabytes = memory.forecast / 1_000_000;
+            self.world.resource_mut::<Instances>().mark_unseen();
+            return Err(RenderError::TreeMemory { megabytes, source });
         }
         let mut status = self.world.resource_mut::<IntegrateStatus>();
         let status = std::mem::take(&mut *status);
@@ -235,7 +276,9 @@ impl Simulation {
         let report = FrameReport {
             frame,
             stage_seconds: self.stage_seconds(),
+            system_seconds: self.world.resource::<StageClock>().systems.clone(),
             rebuilt: self.rebuilt(),
+            table_bytes: self.table_bytes(),
             samples: total,
             rays: status.counters.rays,
             non_finite: film.non_finite(),
@@ -251,9 +294,10 @@ impl Simulation {
     /// The first reference of a component to an entity which is not what it should be.
     fn dangling(&self) -> Option<String> {
         let surfaces = self.world.resource::<Surfaces>().dangling.first();
+        let emissions = || self.world.resource::<Emissions>().dangling.first();
         let instances = || self.world.resource::<Instances>().dangling.first();
         let camera = || self.world.resource::<ViewCamera>().dangling.as_ref();
-        surfaces.or_else(instances).or_else(camera).cloned()
+        surfaces.or_else(emissions).or_else(instances).or_else(camera).cloned()
     }
 
     /// Builds the schedules, which fails when systems conflict without an order between them.
@@ -282,7 +326,7 @@ impl Simulation {
     }
 
     fn stage_seconds(&self) -> Vec<(&'static str, f64)> {
-        let marks = &self.world.resource::<StageClock>().0;
+        let marks = &self.world.resource::<StageClock>().stages;
         ["step", "extract", "build", "integrate"]
             .into_iter()
             .zip(marks.windows(2).map(|pair| (pair[1] - pair[0]).as_secs_f64()))
@@ -292,21 +336,34 @@ impl Simulation {
     fn rebuilt(&self) -> Vec<String> {
         let mut rebuilt = Vec::new();
         let instances = self.world.resource::<Instances>();
-        if instances.rewritten > 0 {
-            rebuilt.push(format!("instances: {} of {}", instances.rewritten, instances.list.len()));
+        let rewritten = instances.rewritten_slots.len();
+        if rewritten > 0 {
+            rebuilt.push(format!("instances: {rewritten} of {}", instances.list.len()));
         }
         let meshes = self.world.resource::<MeshTrees>();
         if meshes.built > 0 {
             rebuilt.push(format!("mesh trees: {} of {}", meshes.built, meshes.list.len()));
         }
-        if self.world.resource::<TopLevel>().built {
+        if self.world.resource::<RestingTree>().built {
+            rebuilt.push("tree of resting meshes".to_owned());
+        }
+        let top = self.world.resource::<TopLevel>();
+        if top.built {
             rebuilt.push("top level".to_owned());
+        } else if top.refitted > 0 {
+            rebuilt.push(format!("top level, refitted: {}", top.refitted));
         }
         let lights = self.world.resource::<LightTable>();
         if lights.built {
             rebuilt.push(format!("lights: {}", lights.len()));
         }
         rebuilt
+    }
+
+    fn table_bytes(&self) -> Vec<(&'static str, u64)> {
+        let instances = self.world.resource::<Instances>().list.capacity() * size_of::<Instance>();
+        let lights = self.world.resource::<LightTable>().memory();
+        vec![("instances", instances as u64), ("light table", lights as u64)]
     }
 
     /// The integrator which the settings ask for, and for `Auto` why it is taken.
@@ -330,10 +387,14 @@ impl Simulation {
 /// Whether every reference between entities leads to what it should.
 fn nothing_dangles(
     surfaces: Res<Surfaces>,
+    emissions: Res<Emissions>,
     instances: Res<Instances>,
     camera: Res<ViewCamera>,
 ) -> bool {
-    surfaces.dangling.is_empty() && instances.dangling.is_empty() && camera.dangling.is_none()
+    surfaces.dangling.is_empty()
+        && emissions.dangling.is_empty()
+        && instances.dangling.is_empty()
+        && camera.dangling.is_none()
 }
 
 /// Builds the frame schedule; every stage installs its own systems and resources.
@@ -346,7 +407,8 @@ fn frame_schedule(world: &mut World) -> Schedule {
     frame.configure_sets((Marks::Opening, Step, Marks::Stepped, Extract).chain());
     frame.configure_sets((Extract, Marks::Extracted, Build, Marks::Built).chain());
     frame.configure_sets((Marks::Built, Integrate, Marks::Integrated).chain());
-    frame.configure_sets((Build.run_if(nothing_dangles), Integrate.run_if(nothing_dangles)));
+    frame.configure_sets(Build.run_if(nothing_dangles));
+    frame.configure_sets(Integrate.run_if(nothing_dangles).run_if(trees_fit));
     for set in [Marks::Opening, Marks::Stepped, Marks::Extracted, Marks::Built, Marks::Integrated] {
         frame.add_systems(mark.in_set(set));
     }
@@ -377,6 +439,25 @@ mod tests {
         let mut simulation = Simulation::new();
         simulation.schedule.add_systems(meddle);
         assert!(simulation.schedule.initialize(&mut simulation.world).is_err());
+    }
+
+    /// Every system of the first three stages is in the report, and together they take no longer than
+    /// their stages.
+    #[test]
+    fn the_report_times_every_system() {
+        let mut simulation = Simulation::new();
+        let settings =
+            crate::description::RenderSettings { size: (2, 2), samples: 1, ..Default::default() };
+        simulation.world.insert_resource(Settings(settings));
+        simulation.world.spawn(Camera::default());
+        let frame = simulation.render_frame(0, &RenderControl::default()).expect("a camera");
+        let FrameReport { system_seconds, stage_seconds, .. } = frame.report;
+        let names: Vec<&str> = system_seconds.iter().map(|(name, _)| *name).collect();
+        let extract = ["camera", "surfaces", "emissions", "instances", "lights", "requirements"];
+        let build = ["mesh trees", "top level", "light table"];
+        assert_eq!(names, [&["poses"][..], &extract, &build].concat());
+        let sum = |list: &[(&str, f64)]| list.iter().map(|(_, seconds)| seconds).sum::<f64>();
+        assert!(sum(&system_seconds) > 0.0 && sum(&system_seconds) < sum(&stage_seconds[..3]));
     }
 
     /// Two systems of a program which move the same things without an order are an error which names

@@ -5,7 +5,7 @@ mod common;
 use common::icosphere;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use kinora::build::bvh::{Hit, MeshTree, SceneGeometry, TopLevel};
-use kinora::description::TriangleMesh;
+use kinora::description::{BvhQuality, TriangleMesh};
 use kinora::extract::{Geometry, Instance, NOTHING};
 use kinora::math::{Aabb, MotionTransform, Ray, offset_ray_origin};
 use kinora::sampling::Sampler;
@@ -50,7 +50,7 @@ impl Uniforms {
 
 fn mesh_of(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Arc<MeshTree> {
     let mesh = TriangleMesh { positions, triangles, normals: Vec::new(), uvs: Vec::new() };
-    Arc::new(MeshTree::build(Arc::new(mesh)))
+    Arc::new(MeshTree::build(Arc::new(mesh), BvhQuality::default()))
 }
 
 /// An instance whose bounds come from many poses, with room: not from the code under test.

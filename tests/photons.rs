@@ -5,7 +5,7 @@ mod common;
 use common::scene;
 use glam::{DVec3, Vec3};
 use kinora::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
-use kinora::build::light::{Aim, LightTable, Lights, PhotonNumbers, PhotonSource};
+use kinora::build::light::{Aim, LightTable, Lights, PhotonNumbers, PhotonSource, ShapeLights};
 use kinora::build::photon::{
     Keep, Photon, PhotonMap, PhotonPass, PhotonStore, PhotonTracer, QueryPoint,
 };
@@ -43,6 +43,7 @@ impl Tables {
     fn lights(&self) -> Lights<'_> {
         Lights {
             table: self.get::<LightTable>(),
+            shapes: self.get::<ShapeLights>(),
             punctual: &self.get::<PunctualLights>().0,
             geometry: self.geometry(),
             materials: &self.get::<Surfaces>().materials,

@@ -3,7 +3,7 @@
 use kinora::description::{
     Clock, LoadOptions, RenderSettings, SceneDescription, load_scene, parse_scene_str,
 };
-use kinora::frame::Simulation;
+use kinora::frame::{RenderControl, Simulation};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ fn scenes() -> Vec<PathBuf> {
     let paths = entries.map(|entry| entry.expect("readable").path());
     let mut scenes: Vec<_> = paths.filter(|p| p.extension().is_some_and(|e| e == "ron")).collect();
     scenes.sort();
-    assert!(scenes.len() >= 3, "{scenes:?}");
+    assert!(scenes.len() >= 6, "{scenes:?}");
     scenes
 }
 
@@ -39,6 +39,27 @@ fn every_scene_can_be_put_together_and_nothing_in_it_is_out_of_reach() {
             simulation.prepare_frame(frame).expect("there is a camera");
             assert_eq!(simulation.warnings(), [""; 0], "{} at frame {frame}", path.display());
         }
+    }
+}
+
+/// A small picture of a frame from the middle of each film: light arrives, no sample is lost, and
+/// no path ends but by itself.
+#[test]
+fn every_scene_renders() {
+    for path in scenes() {
+        let mut scene = load_scene(&path, &LoadOptions::default()).expect("tested above");
+        let (width, height) = (scene.render.size.0 * 18 / scene.render.size.1, 18);
+        (scene.render.size, scene.render.samples) = ((width, height), 2);
+        let mut simulation = Simulation::from_description(&scene);
+        let frame = scene.clock.frames.1 / 2;
+        let rendered = simulation.render_frame(frame, &RenderControl::default());
+        let rendered = rendered.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let name = path.display();
+        assert_eq!((rendered.report.non_finite, rendered.report.truncated_paths), (0, 0), "{name}");
+        let count = width * height;
+        let pixels = (0..count).map(|i| rendered.film.radiance(i % width, i / width));
+        let lit = pixels.filter(|radiance| radiance.max_element() > 0.0).count();
+        assert!(lit as u32 > count * 9 / 10, "{name}: {lit} of {count} pixels are not black");
     }
 }
 
@@ -122,7 +143,10 @@ fn the_scene_format_tells_the_true_defaults_of_clock_and_settings() {
     let format = fs::read_to_string(repository().join("docs/scene-format.md")).expect("readable");
     let clock = documented_defaults(&format, "Clock");
     let render = documented_defaults(&format, "Render");
+    let photons = documented_defaults(&format, "Photons");
+    assert!(photons.contains("nearest"), "{photons}");
     assert!(clock.contains("shutter") && render.contains("exr_bits"), "{clock}; {render}");
+    let render = render.replace("photons: ()", &format!("photons: ({photons})"));
     let scene = scene_with(&format!("clock: ({clock}), render: ({render}),"));
     assert_eq!(scene.clock, Clock::default(), "{clock}");
     assert_eq!(scene.render, RenderSettings::default(), "{render}");

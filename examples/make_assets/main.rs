@@ -5,10 +5,15 @@
 //! scenes instead. Everything follows from the numbers in this program: each run gives the same
 //! files, which a test holds.
 
+mod figure;
+mod glb;
 mod keys;
 mod knife;
 mod noise;
+mod surface_net;
 mod textures;
+mod water;
+mod wine_glass;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageBuffer, Rgb};
@@ -21,7 +26,9 @@ use textures::Painting;
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = std::env::args().nth(1);
     if argument.as_deref() == Some("--keys") {
-        println!("swing:{}\n\nringing:{}", keys::swing(), keys::ringing());
+        for (name, keys) in keys::ALL {
+            println!("{name}:{}\n", keys());
+        }
         return Ok(());
     }
     let folder = argument
@@ -29,9 +36,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::create_dir_all(&folder)?;
     fs::write(folder.join("knife-blade.obj"), knife::blade())?;
     fs::write(folder.join("knife-handle.obj"), knife::handle())?;
-    save(&textures::STONE_WALL, &folder.join("stone-wall.png"))?;
-    save(&textures::WOOD_BOARD, &folder.join("wood.png"))?;
+    for (name, mesh) in meshes() {
+        fs::write(folder.join(name), mesh.to_glb())?;
+    }
+    for (name, painting) in &textures::ALL {
+        save(painting, &folder.join(name))?;
+    }
     Ok(())
+}
+
+/// The meshes with their files: fine ones for pictures, and a coarse rabbit whose facets show.
+fn meshes() -> [(&'static str, glb::Mesh); 5] {
+    let (rabbit, fish) = (figure::rabbit(), figure::fish());
+    [
+        ("rabbit.glb", surface_net::surface_net(&rabbit, 0.0122)),
+        ("rabbit-coarse.glb", surface_net::surface_net(&rabbit, 0.045)),
+        ("fish.glb", surface_net::surface_net(&fish, 0.004)),
+        ("wine-glass.glb", wine_glass::glass()),
+        ("wine.glb", wine_glass::wine()),
+    ]
 }
 
 /// Writes a PNG as small as the encoder can make it: these files are kept.

@@ -1,6 +1,7 @@
-//! Stone wall and wood as images of linear reflectance, encoded as 8-bit sRGB.
+//! Stone wall, wood, marble, tiles and balls as images of linear reflectance, encoded as 8-bit sRGB.
 
 use crate::noise::{fbm, hash, mix, smooth};
+use std::f64::consts::{PI, TAU};
 
 /// Linear reflectance in Rec. 709.
 type Color = [f64; 3];
@@ -46,6 +47,65 @@ fn wood(u: f64, v: f64) -> Color {
     std::array::from_fn(|c| mix(early[c], late[c], 0.65 * ring + 0.35 * fibre))
 }
 
+/// Marble: veins along a sine that noise bends.
+fn marble(u: f64, v: f64) -> Color {
+    let bend = fbm(4.0 * u, 4.0 * v, 6, 41);
+    let wave = 0.5 + 0.5 * (TAU * (2.0 * u + 1.2 * v + 2.2 * bend)).sin();
+    let (vein, stone) = ([0.16, 0.18, 0.20], [0.86, 0.85, 0.82]);
+    std::array::from_fn(|c| mix(vein[c], stone[c], wave.powf(0.35)))
+}
+
+/// Glazed tiles, eight by eight to the unit square, each of its own shade, with light joints.
+fn tiles(u: f64, v: f64) -> Color {
+    let (u, v) = (8.0 * u, 8.0 * v);
+    let to_middle = (u - u.floor() - 0.5).abs().max((v - v.floor() - 0.5).abs());
+    let shade = 0.85 + 0.25 * hash(u.floor() as i64, v.floor() as i64, 51);
+    let tile = [0.42, 0.68, 0.74].map(|c| c * shade);
+    let joint = smooth(0.455, 0.475, to_middle);
+    let grout = [0.80, 0.82, 0.80];
+    std::array::from_fn(|c| mix(tile[c], grout[c], joint))
+}
+
+/// A beach ball: six gores, every second one white, and white caps. `u` is the longitude, `v` the
+/// latitude from pole to pole.
+fn beach_ball(u: f64, v: f64) -> Color {
+    let white = [0.92, 0.92, 0.90];
+    if (PI * (v - 0.5)).sin().abs() > 0.93 {
+        return white;
+    }
+    match (6.0 * u) as u32 {
+        0 => [0.85, 0.08, 0.06],
+        2 => [0.05, 0.20, 0.75],
+        4 => [0.95, 0.70, 0.05],
+        _ => white,
+    }
+}
+
+/// A ball with a blue band around it, on which eight stars stand, each with a tip to the pole.
+fn star_ball(u: f64, v: f64) -> Color {
+    let (latitude, longitude) = (PI * (v - 0.5), TAU * u);
+    if latitude.sin().abs() >= 0.30 {
+        return [0.90, 0.88, 0.82];
+    }
+    let eighth = TAU / 8.0;
+    let from_star = longitude - eighth * (longitude / eighth).round();
+    // Angle from the middle of the star, and the bearing there from the pole.
+    let (east, north) = (latitude.cos() * from_star.sin(), latitude.sin());
+    let radius = east.hypot(north).min(1.0).asin();
+    let star = is_in_star(radius, east.atan2(north), 0.21, 0.382 * 0.21);
+    if star { [0.93, 0.93, 0.90] } else { [0.10, 0.16, 0.55] }
+}
+
+/// Whether a point in polar coordinates lies in a five-pointed star with a tip at angle 0.
+fn is_in_star(radius: f64, angle: f64, outer: f64, inner: f64) -> bool {
+    // Folded into half a point of the star: its edge runs from the tip to the notch.
+    let fifth = TAU / 5.0;
+    let folded = (angle - fifth * (angle / fifth).round()).abs();
+    let (x, y) = (radius * folded.cos(), radius * folded.sin());
+    let (notch_x, notch_y) = (inner * (PI / 5.0).cos(), inner * (PI / 5.0).sin());
+    (notch_x - outer) * y - notch_y * (x - outer) >= 0.0
+}
+
 /// The back wall of the room: x from −1.35 to 1.35 m, y from 0 to 1.6 m, at 320 pixels per metre.
 pub const STONE_WALL: Painting =
     Painting { size: (864, 512), color: |u, v| stone(2.7 * u - 1.35, 1.6 * v) };
@@ -53,7 +113,32 @@ pub const STONE_WALL: Painting =
 /// One board; taller than wide, for the sake of the fibres.
 pub const WOOD_BOARD: Painting = Painting { size: (384, 768), color: wood };
 
+/// The deck around the pool as far as it is seen: x from −2.75 to 2.75 m, z from −2 m at the top to 2 m,
+/// at 186 pixels per metre. The unit of the marble is 2 m.
+pub const MARBLE_DECK: Painting =
+    Painting { size: (1024, 744), color: |u, v| marble(2.75 * u - 1.375, 1.0 - 2.0 * v) };
+
+/// The unit of the tiles.
+pub const POOL_TILES: Painting = Painting { size: (512, 512), color: tiles };
+
+/// The beach ball, unrolled.
+pub const BEACH_BALL: Painting = Painting { size: (768, 384), color: beach_ball };
+
+/// The ball with stars, unrolled.
+pub const STAR_BALL: Painting = Painting { size: (1024, 512), color: star_ball };
+
+/// Every painting with the name of its file.
+pub const ALL: [(&str, Painting); 6] = [
+    ("stone-wall.png", STONE_WALL),
+    ("wood.png", WOOD_BOARD),
+    ("marble-deck.png", MARBLE_DECK),
+    ("pool-tiles.png", POOL_TILES),
+    ("beach-ball.png", BEACH_BALL),
+    ("star-ball.png", STAR_BALL),
+];
+
 /// A function of uv, `v` upwards, to be averaged over each pixel.
+#[derive(Clone, Copy)]
 pub struct Painting {
     /// Width and height in pixels.
     pub size: (u32, u32),

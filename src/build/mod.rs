@@ -2,27 +2,39 @@
 
 pub mod bvh;
 pub mod light;
+mod memory;
 pub mod photon;
 
-use crate::frame::FrameSystems;
+pub(crate) use memory::trees_fit;
+pub use memory::{TreeMemory, forecast_tree_memory};
+
+use crate::frame::{FrameSystems, stamp};
 use bevy_ecs::prelude::*;
 
 /// Adds the resources and the systems of this stage.
 pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
+    world.insert_resource(bvh::RestingTree::default());
     world.insert_resource(bvh::MeshTrees::default());
     world.insert_resource(bvh::TopLevel::default());
     world.insert_resource(light::LightTable::default());
     world.insert_resource(light::PhotonSource::default());
-    frame.add_systems(
-        (
-            bvh::rebuild_mesh_trees,
-            bvh::rebuild_top_level,
-            light::rebuild_light_table,
-            light::rebuild_photon_source.run_if(photons_are_traced),
-        )
-            .chain()
-            .in_set(FrameSystems::Build),
+    world.insert_resource(light::ShapeLights::default());
+    world.insert_resource(TreeMemory::default());
+    let trees = (
+        bvh::join_resting_meshes,
+        stamp("resting meshes"),
+        bvh::rebuild_mesh_trees,
+        stamp("mesh trees"),
+        bvh::rebuild_top_level,
+        stamp("top level"),
+        light::rebuild_light_table,
+        light::prepare_shape_lights,
+        stamp("light table"),
+        light::rebuild_photon_source.run_if(photons_are_traced),
+        stamp("photon source"),
     );
+    let trees = trees.chain().run_if(trees_fit);
+    frame.add_systems((forecast_tree_memory, trees).chain().in_set(FrameSystems::Build));
 }
 
 /// Whether the integrator of this frame works with photons.

@@ -191,6 +191,7 @@ impl Job {
             &report.integrator,
             world_to_camera,
         );
+        let finished = Instant::now();
         // The larger file first: on a full disk nothing of the frame remains.
         let saturated = write_exr(&files.exr, &film, settings, &metadata)?;
         write_png(&files.png, &film, settings)?;
@@ -199,6 +200,7 @@ impl Job {
             fingerprint,
             files: FrameEntry::file_names(&files),
             wall_seconds: start.elapsed().as_secs_f64(),
+            write_seconds: finished.elapsed().as_secs_f64(),
             peak_memory_bytes: peak_memory_bytes(),
             saturated,
             report,

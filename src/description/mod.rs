@@ -13,6 +13,7 @@ mod settings;
 mod shape;
 mod texture;
 mod value;
+mod waves;
 
 pub use camera::{Camera, Focus, SENSOR_HEIGHT};
 pub use diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
@@ -24,7 +25,8 @@ pub use motion::{
 pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
-pub use settings::{Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
+pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};
 pub use value::{Rgb, Value};
+pub use waves::{Wave, Waves};

@@ -2,7 +2,7 @@
 
 use super::{
     Acceleration, Camera, Clock, Diagnostics, Emission, ImageData, Keyframes, Light, LookAt,
-    Material, RenderSettings, Shape, Texture, Transform, TriangleMesh, Velocity,
+    Material, RenderSettings, Shape, Texture, Transform, TriangleMesh, Velocity, Waves,
 };
 use indexmap::IndexMap;
 use std::path::PathBuf;
@@ -32,6 +32,8 @@ pub struct SceneDescription {
     pub materials: IndexMap<String, Material<String>>,
     /// Meshes by name.
     pub meshes: IndexMap<String, Arc<TriangleMesh>>,
+    /// The meshes which are surfaces of water, by name; `meshes` holds them at rest.
+    pub waves: IndexMap<String, Waves>,
     /// Entities by name, in the order of the file.
     pub entities: IndexMap<String, EntityDescription>,
 }

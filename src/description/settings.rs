@@ -38,6 +38,13 @@ pub struct RenderSettings {
     pub max_depth: u32,
     /// Interactions before Russian roulette may end a path. Trades variance for time; no bias.
     pub roulette_depth: u32,
+    /// What the throughput of a path is multiplied by to be its probability to survive Russian
+    /// roulette. Trades variance for time; no bias.
+    pub roulette_gain: f32,
+    /// Side, in pixels, of the groups of pixels whose paths use each other's continuations; 1 for none.
+    /// Trades the independence of the noise of neighbouring pixels, and shadow rays, for less of it; no
+    /// bias.
+    pub share: u32,
     /// How light is simulated.
     pub integrator: IntegratorChoice,
     /// Where caustics come from with the integrator `Path`.
@@ -57,6 +64,9 @@ pub struct RenderSettings {
     /// How far interpolated motion may stray from the true motion, as a fraction of the distance
     /// that the object moves during the shutter. Trades the shape of curved blur for motion keys.
     pub motion_tolerance: f64,
+    /// How much work goes into the trees of meshes. Trades time and memory before the first ray for
+    /// the time of every ray; the picture is the same.
+    pub bvh: BvhQuality,
     /// Exposure in stops: the picture is multiplied by `2^exposure` before the tone curve.
     pub exposure: f32,
     /// The tone curve of the PNG; the EXR stays linear.
@@ -73,7 +83,9 @@ impl Default for RenderSettings {
             size: (640, 480),
             samples: 64,
             max_depth: 1000,
-            roulette_depth: 4,
+            roulette_depth: 2,
+            roulette_gain: 2.5,
+            share: 4,
             integrator: IntegratorChoice::Auto,
             caustics: Caustics::default(),
             photons: PhotonSettings::default(),
@@ -82,6 +94,7 @@ impl Default for RenderSettings {
             filter: Filter::default(),
             clamp_indirect: None,
             motion_tolerance: 0.001,
+            bvh: BvhQuality::default(),
             exposure: 0.0,
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],
@@ -102,6 +115,23 @@ pub enum IntegratorChoice {
     PhotonMap,
     /// Stochastic progressive photon mapping.
     Sppm,
+}
+
+/// How the trees of meshes are built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum BvhQuality {
+    /// Soon done: for previews and for meshes that change in every frame.
+    Fast,
+    /// Large triangles are cut into parts.
+    #[default]
+    Balanced,
+    /// In addition parts of the tree are moved to better places: for long renders.
+    Best,
+}
+
+impl BvhQuality {
+    /// Every quality once, from the fastest build to the fastest rays.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Balanced, Self::Best];
 }
 
 /// Pixel filters, in pixels; sampled by importance, so that each sample has weight 1.

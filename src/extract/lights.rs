@@ -20,13 +20,23 @@ pub struct PunctualLight {
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct PunctualLights(pub Vec<PunctualLight>);
 
+/// Any change of a light.
+type LightChanged =
+    (With<Light>, Or<(Changed<Light>, Changed<ShutterMotion>, Changed<EmissionFactor>)>);
+
 /// Writes [`PunctualLights`] when it is different from before.
 pub fn extract_lights(
     origin: Res<FrameOrigin>,
     slots: Res<SurfaceSlots>,
+    changed: Query<(), LightChanged>,
+    mut removed: (RemovedComponents<Light>, RemovedComponents<EmissionFactor>),
     lights: Query<(Entity, &Light, &ShutterMotion, Option<&EmissionFactor>)>,
     mut table: ResMut<PunctualLights>,
 ) {
+    let gone = removed.0.read().count() + removed.1.read().count();
+    if !(origin.is_changed() || slots.is_changed() || gone > 0) && changed.is_empty() {
+        return;
+    }
     let mut found: Vec<(Entity, PunctualLight)> = lights
         .iter()
         .map(|(entity, light, motion, factor)| {

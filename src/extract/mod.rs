@@ -6,22 +6,26 @@
 //! that a scene may be anywhere.
 
 mod camera;
+mod emissions;
+mod instance;
 mod instances;
 mod lights;
 mod method;
 mod requirements;
+mod resting;
 mod surfaces;
 
 pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
-pub use instances::{
-    Geometry, Instance, Instances, Meshes, NOTHING, extract_instances, extract_meshes,
-};
+pub use emissions::{Emissions, SurfaceEmission, extract_emissions};
+pub use instance::{Geometry, Instance, NOTHING};
+pub use instances::{Instances, Meshes, extract_instances, extract_meshes};
 pub use lights::{PunctualLight, PunctualLights, extract_lights};
 pub use method::{ChosenIntegrator, Method, choose_integrator};
 pub use requirements::{Feature, Requirements, derive_requirements};
-pub use surfaces::{SurfaceEmission, SurfaceSlots, Surfaces, extract_surfaces};
+pub use resting::{RestingMesh, RestingMeshes, extract_resting_meshes};
+pub use surfaces::{SurfaceSlots, Surfaces, extract_surfaces};
 
-use crate::frame::FrameSystems;
+use crate::frame::{FrameSystems, stamp};
 use bevy_ecs::prelude::*;
 
 /// Adds the tables and the systems of this stage.
@@ -30,20 +34,31 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(ViewCamera::default());
     world.insert_resource(Meshes::default());
     world.insert_resource(Instances::default());
+    world.insert_resource(RestingMeshes::default());
     world.insert_resource(Surfaces::default());
     world.insert_resource(SurfaceSlots::default());
+    world.insert_resource(Emissions::default());
     world.insert_resource(PunctualLights::default());
     world.insert_resource(Requirements::default());
     world.insert_resource(ChosenIntegrator::default());
     frame.add_systems(
         (
             extract_camera,
+            stamp("camera"),
             extract_surfaces,
+            stamp("surfaces"),
+            extract_emissions,
+            stamp("emissions"),
             extract_meshes,
             extract_instances,
+            stamp("instances"),
+            extract_resting_meshes,
+            stamp("resting meshes"),
             extract_lights,
+            stamp("lights"),
             derive_requirements,
             choose_integrator,
+            stamp("requirements"),
         )
             .chain()
             .in_set(FrameSystems::Extract),

@@ -1,8 +1,8 @@
 //! What a scene requires, with the reason; everything else is left out of the work.
 
-use super::{Instances, PunctualLights, Surfaces, ViewCamera};
+use super::{Instances, Meshes, PunctualLights, Surfaces, ViewCamera};
 use crate::description::Light;
-use crate::world::{Name, Settings, Shape, ShutterMotion};
+use crate::world::{Deformation, Name, Settings, Shape, ShutterMotion, VertexMotion};
 use bevy_ecs::prelude::*;
 
 /// Something that a scene may require.
@@ -14,6 +14,8 @@ pub enum Feature {
     CameraMotion,
     /// A lens with an aperture.
     Lens,
+    /// Meshes whose vertices move within the shutter.
+    Deformation,
     /// Surfaces with holes.
     Opacity,
     /// Solids which absorb light inside.
@@ -38,30 +40,79 @@ impl Requirements {
     }
 }
 
-/// Writes [`Requirements`] when they are different from before.
+/// How many objects are made of materials of a kind.
+#[derive(Debug, Default)]
+pub struct Census {
+    masked: usize,
+    absorbing: usize,
+    /// Those which may cast caustics, and those on which photons may be gathered.
+    specular: usize,
+    storable: usize,
+}
+
+impl Census {
+    /// Counts the objects; each material is looked at once.
+    fn take(instances: &Instances, surfaces: &Surfaces, min_alpha: f32) -> Self {
+        let mut objects = vec![0; surfaces.default_material as usize + 1];
+        for instance in &instances.list {
+            if let Some(count) = objects.get_mut(instance.material as usize) {
+                *count += 1;
+            }
+        }
+        let materials = &surfaces.materials;
+        let mut census = Self::default();
+        for (material, count) in (0..).zip(objects).filter(|(_, count)| *count > 0) {
+            census.masked += if materials.has_opacity(material) { count } else { 0 };
+            census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
+            let specular = materials.may_cast_caustics(material, min_alpha);
+            census.specular += if specular { count } else { 0 };
+            let storable = materials.may_be_storable(material, min_alpha);
+            census.storable += if storable { count } else { 0 };
+        }
+        census
+    }
+}
+
+/// Writes [`Requirements`] when something that they follow from changed and they are different from
+/// before. Objects are counted anew only when there are others or their materials changed.
 pub fn derive_requirements(
     instances: Res<Instances>,
+    meshes: Res<Meshes>,
     surfaces: Res<Surfaces>,
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
     settings: Res<Settings>,
-    named: Query<(&Name, &ShutterMotion), With<Shape>>,
+    named: Query<(&ShutterMotion, &Name), With<Shape>>,
+    mut census: Local<Census>,
+    deforming: Query<(Option<&Name>, &VertexMotion), With<Deformation>>,
     mut requirements: ResMut<Requirements>,
 ) {
+    let rewritten = instances.is_changed();
+    let looks = surfaces.is_changed() || lights.is_changed() || camera.is_changed();
+    if !(rewritten || looks || meshes.is_changed() || settings.is_changed()) {
+        return;
+    }
+    if surfaces.is_changed() || settings.is_changed() || (rewritten && instances.restructured) {
+        *census = Census::take(&instances, &surfaces, settings.0.photons.min_alpha());
+    }
     let mut found = Requirements::default();
     let mut require = |feature, reason: String| found.features.push((feature, reason));
-    let moving = instances.list.iter().filter(|i| !i.motion.is_static()).count()
-        + lights.0.iter().filter(|l| !l.motion.is_static()).count();
+    let moving = instances.moving + lights.0.iter().filter(|l| !l.motion.is_static()).count();
     if moving > 0 {
-        let mut names: Vec<&str> = named
-            .iter()
-            .filter(|(_, motion)| motion.keys.len() > 1)
-            .map(|(name, _)| name.as_str())
-            .collect();
-        names.sort_unstable();
-        let shown = names.iter().take(3).map(|name| format!("`{name}`")).collect::<Vec<_>>();
-        let who = if shown.is_empty() { String::new() } else { format!(": {}", shown.join(", ")) };
+        let who = first_names(named);
+        let who = if who.is_empty() { String::new() } else { format!(": {who}") };
         require(Feature::Motion, format!("{moving} moving in the shutter{who}"));
+    }
+    let mut forms: Vec<_> = deforming
+        .iter()
+        .filter(|(_, motion)| !motion.later.is_empty())
+        .map(|(name, motion)| (name.map_or("", |name| name.as_str()), motion.later.len() + 1))
+        .collect();
+    forms.sort_unstable();
+    if let Some((name, keys)) = forms.first() {
+        let count = forms.len();
+        let reason = format!("{count} deforming in the shutter: `{name}` with {keys} keys");
+        require(Feature::Deformation, reason);
     }
     if !camera.is_static() {
         require(Feature::CameraMotion, "the camera moves in the shutter".to_owned());
@@ -69,26 +120,33 @@ pub fn derive_requirements(
     if camera.has_lens() {
         require(Feature::Lens, "the camera has an aperture".to_owned());
     }
-    let used = |test: &dyn Fn(u32) -> bool| {
-        instances.list.iter().filter(|i| i.material != super::NOTHING && test(i.material)).count()
-    };
-    let masked = used(&|m| surfaces.materials.has_opacity(m));
-    if masked > 0 {
-        require(Feature::Opacity, format!("{masked} objects with a mask"));
+    if census.masked > 0 {
+        require(Feature::Opacity, format!("{} objects with a mask", census.masked));
     }
-    let absorbing = used(&|m| surfaces.materials.attenuation(m).is_some());
-    if absorbing > 0 {
-        require(Feature::Absorption, format!("{absorbing} absorbing solids"));
+    if census.absorbing > 0 {
+        require(Feature::Absorption, format!("{} absorbing solids", census.absorbing));
     }
     let skies = lights.0.iter().filter(|l| matches!(l.light, Light::Sky { .. })).count();
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
     }
-    let min_alpha = settings.0.photons.min_alpha();
-    let specular = used(&|m| surfaces.materials.may_cast_caustics(m, min_alpha));
-    let storable = used(&|m| surfaces.materials.may_be_storable(m, min_alpha));
-    if specular > 0 && storable > 0 {
-        require(Feature::Caustics, format!("{specular} mirrors, clear or polished objects"));
+    if census.specular > 0 && census.storable > 0 {
+        let reason = format!("{} mirrors, clear or polished objects", census.specular);
+        require(Feature::Caustics, reason);
     }
     requirements.set_if_neq(found);
+}
+
+/// The first three names of what moves, in the order of names.
+fn first_names(named: Query<(&ShutterMotion, &Name), With<Shape>>) -> String {
+    let mut first: Vec<&str> = Vec::with_capacity(4);
+    for (_, name) in named.iter().filter(|(motion, _)| motion.keys.len() > 1) {
+        let name = name.as_str();
+        let place = first.partition_point(|known| *known <= name);
+        if place < 3 {
+            first.insert(place, name);
+            first.truncate(3);
+        }
+    }
+    first.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }

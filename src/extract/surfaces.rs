@@ -1,19 +1,17 @@
-//! Materials, textures and emissions as tables.
+//! Materials and textures as tables.
 
 use super::spawn_order;
-use crate::description::{EmissionStrength, Rgb, Value};
+use crate::description::{Rgb, Value};
 use crate::shade::{MaterialTable, material_cycle};
-use crate::world::{Emission, EmissionFactor, Material, Texture};
+use crate::world::{Material, Texture};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 
-/// What surfaces are made of and what they emit, by index.
+/// What surfaces are made of, by index.
 #[derive(Resource)]
 pub struct Surfaces {
     /// Materials and textures.
     pub materials: MaterialTable,
-    /// Emissions of shapes.
-    pub emissions: Vec<SurfaceEmission>,
     /// Index of the grey of objects which have no material and emit nothing.
     pub default_material: u32,
     /// Materials which look at uv, by index.
@@ -24,43 +22,24 @@ pub struct Surfaces {
 
 impl Default for Surfaces {
     fn default() -> Self {
-        Self::new(Vec::new(), Vec::new(), Vec::new())
+        Self::new(Vec::new(), Vec::new())
     }
 }
 
 impl Surfaces {
-    fn new(
-        mut materials: Vec<crate::description::Material<u32>>,
-        textures: Vec<Texture>,
-        emissions: Vec<SurfaceEmission>,
-    ) -> Self {
+    fn new(mut materials: Vec<crate::description::Material<u32>>, textures: Vec<Texture>) -> Self {
         let default_material = materials.len() as u32;
         let grey = Value::Constant(Rgb::splat(0.5));
         materials.push(crate::description::Material::Diffuse { albedo: grey });
         let textured = materials.iter().map(is_textured).collect();
         let materials = MaterialTable::new(&materials, textures);
-        Self { materials, emissions, default_material, textured, dangling: Vec::new() }
+        Self { materials, default_material, textured, dangling: Vec::new() }
     }
 
-    /// Whether a material or an emission, each by index or [`super::NOTHING`], looks at uv.
-    pub fn needs_uv(&self, material: u32, emission: u32) -> bool {
-        let emission = self.emissions.get(emission as usize);
+    /// Whether a material, by index or [`super::NOTHING`], looks at uv.
+    pub fn is_textured(&self, material: u32) -> bool {
         self.textured.get(material as usize).is_some_and(|textured| *textured)
-            || emission.is_some_and(|e| {
-                matches!(e.strength, EmissionStrength::Radiance(Value::Texture(_)))
-            })
     }
-}
-
-/// The emission of a shape.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SurfaceEmission {
-    /// Radiance, or for a total power watts per channel: then the instance divides by its area.
-    pub strength: EmissionStrength<u32>,
-    /// The mean over the shutter of the keyed factor.
-    pub factor: f32,
-    /// Whether the back emits as well.
-    pub two_sided: bool,
 }
 
 /// Stands in for a material which cannot be; the frame is not rendered then.
@@ -79,30 +58,20 @@ pub struct SurfaceSlots {
     pub materials: EntityHashMap<u32>,
     /// Entities with a texture.
     pub textures: EntityHashMap<u32>,
-    /// Objects with an emission.
-    pub emissions: EntityHashMap<u32>,
 }
 
-/// Rebuilds [`Surfaces`] when a texture, a material or an emission was added, changed or removed.
+/// Rebuilds [`Surfaces`] when a texture or a material was added, changed or removed.
 ///
 /// Slots follow the order of the entities, which is that of spawning.
 pub fn extract_surfaces(
-    changed: Query<
-        (),
-        Or<(Changed<Material>, Changed<Texture>, Changed<Emission>, Changed<EmissionFactor>)>,
-    >,
-    mut removed: (
-        RemovedComponents<Material>,
-        RemovedComponents<Texture>,
-        RemovedComponents<Emission>,
-    ),
+    changed: Query<(), Or<(Changed<Material>, Changed<Texture>)>>,
+    mut removed: (RemovedComponents<Material>, RemovedComponents<Texture>),
     materials: Query<(Entity, &Material)>,
     textures: Query<(Entity, &Texture)>,
-    emissions: Query<(Entity, &Emission, Option<&EmissionFactor>)>,
     mut surfaces: ResMut<Surfaces>,
     mut slots: ResMut<SurfaceSlots>,
 ) {
-    let gone = removed.0.read().count() + removed.1.read().count() + removed.2.read().count();
+    let gone = removed.0.read().count() + removed.1.read().count();
     if changed.is_empty() && gone == 0 {
         return;
     }
@@ -140,36 +109,12 @@ pub fn extract_surfaces(
         .collect();
     images.sort_unstable_by_key(|(slot, _)| *slot);
     let images: Vec<Texture> = images.into_iter().map(|(_, texture)| texture).collect();
-
-    let emission_slots = in_spawn_order(emissions.iter().map(|(entity, ..)| entity));
-    let mut emitted: Vec<(u32, SurfaceEmission)> = emissions
-        .iter()
-        .map(|(entity, emission, factor)| {
-            let strength = match emission.clone().map_ref(&mut { texture_of }) {
-                Ok(indexed) => indexed.strength,
-                Err(what) => {
-                    dangling.push(format!("the emission of {entity} refers to {what}"));
-                    EmissionStrength::Power(Rgb::ZERO)
-                }
-            };
-            let factor = factor.map_or(1.0, |f| f.0 as f32);
-            let emission = SurfaceEmission { strength, factor, two_sided: emission.two_sided };
-            (emission_slots[&entity], emission)
-        })
-        .collect();
-    emitted.sort_unstable_by_key(|(slot, _)| *slot);
-
-    let emitted = emitted.into_iter().map(|(_, emission)| emission).collect();
-    *surfaces = Surfaces { dangling, ..Surfaces::new(table, images, emitted) };
-    slots.set_if_neq(SurfaceSlots {
-        materials: material_slots,
-        textures: texture_slots,
-        emissions: emission_slots,
-    });
+    *surfaces = Surfaces { dangling, ..Surfaces::new(table, images) };
+    slots.set_if_neq(SurfaceSlots { materials: material_slots, textures: texture_slots });
 }
 
 /// Numbers entities in the order in which they were spawned.
-fn in_spawn_order(entities: impl Iterator<Item = Entity>) -> EntityHashMap<u32> {
+pub(super) fn in_spawn_order(entities: impl Iterator<Item = Entity>) -> EntityHashMap<u32> {
     let mut entities: Vec<Entity> = entities.collect();
     entities.sort_unstable_by_key(|entity| spawn_order(*entity));
     entities.into_iter().zip(0..).collect()

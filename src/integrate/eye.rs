@@ -31,7 +31,7 @@ use crate::film::PixelSample;
 use crate::math::{Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// How much wider photons are gathered at points which the camera sees by a diffuse bounce: the
 /// bounce blurs what is found there anyway.
@@ -261,9 +261,11 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         let storable = bsdf.is_storable(self.settings.min_alpha());
         // A ray of a final gathering reads all photons where it is long enough.
         let read_here = storable && walk.reads && self.read(walk, hit, &vertex, context);
+        let (direction, on_light) = sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
         if !read_here {
             if self.takes_light_rays(walk, &bsdf, storable) {
-                self.light_rays(walk, &vertex, &receiver, sampler, dimensions, material, context);
+                let choose = sampler.one_fine(dimensions + dimension::LIGHT);
+                self.light_rays(walk, &vertex, &receiver, (choose, on_light), material, context);
             }
             if storable {
                 self.gather_here(walk, &vertex, context);
@@ -273,7 +275,6 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         if gathers {
             self.final_gathering(walk, &vertex, &receiver, material, context);
         }
-        let direction = sampler.two(dimensions + dimension::DIRECTION);
         let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { return false };
         let diffuse = storable && !drawn.delta;
         if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
@@ -285,7 +286,8 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         }
         let u = || roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
         if walk.depth >= self.path.roulette_depth {
-            let survival = (walk.throughput * walk.eta_scale).max_element().min(1.0);
+            let carried = (walk.throughput * walk.eta_scale).max_element();
+            let survival = (carried * self.path.roulette_gain).min(1.0);
             if survival.is_nan() || u() >= survival {
                 return false;
             }
@@ -329,20 +331,19 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         self.method == Method::Sppm || walk.since == Since::Never
     }
 
-    #[expect(clippy::too_many_arguments, reason = "a point of a path, and where it is")]
+    /// Sends a ray to a point of a light, drawn by these numbers.
     fn light_rays(
         &self,
         walk: &Walk,
         vertex: &Vertex,
         receiver: &Receiver,
-        sampler: &Sampler,
-        dimensions: u32,
+        (choose, on_light): (f64, Vec2),
         material: u32,
         context: &mut Context,
     ) {
         let time = walk.ray.time;
         let (wi, distance, mut light) =
-            self.path.direct(vertex, receiver, sampler, dimensions, time, context.counters);
+            self.path.direct(vertex, receiver, choose, on_light, time, context.counters);
         if ABSORPTION && light != Rgb::ZERO {
             let medium = self.path.medium_towards(wi, vertex, material, walk.inside);
             light *= self.path.transmittance(medium, distance);
@@ -392,7 +393,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
             let sampler = context.key.gather_ray(k, n);
             let dimensions = dimension::vertex(walk.met - 1);
             let lobe = sampler.one(dimensions + dimension::LOBE);
-            let direction = sampler.two(dimensions + dimension::DIRECTION);
+            let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
             let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { continue };
             if drawn.delta {
                 continue; // the camera path itself goes on there

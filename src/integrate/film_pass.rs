@@ -4,7 +4,7 @@ use super::photon_passes::PhotonReport;
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
 use crate::description::RenderSettings;
-use crate::extract::{Feature, FrameOrigin};
+use crate::extract::{CameraRay, Feature, FrameOrigin, Requirements};
 use crate::film::{Film, FilmError, FilterSampler, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::sampling::{Sampler, dimension};
@@ -38,6 +38,8 @@ pub(super) struct Job<'a> {
     /// Whether anything depends on the time in the shutter.
     pub(super) has_time: bool,
     pub(super) has_lens: bool,
+    /// Side of the groups of pixels which share their paths; 1 for none.
+    share: u32,
     pub(super) control: &'a RenderControl,
 }
 
@@ -53,8 +55,11 @@ impl<'a> Job<'a> {
             settings,
             filter: FilterSampler::new(&settings.filter),
             frame,
-            has_time: requires(Feature::Motion) || requires(Feature::CameraMotion),
+            has_time: requires(Feature::Motion)
+                || requires(Feature::CameraMotion)
+                || requires(Feature::Deformation),
             has_lens: requires(Feature::Lens),
+            share: shared_side(settings, scene.requirements),
             control,
         }
     }
@@ -97,6 +102,17 @@ pub fn render_film(
     }
 }
 
+/// The side of the groups which share their paths.
+///
+/// Paths of different times see different scenes; surfaces with holes and solids which absorb would
+/// have to be followed along every connection; and a limit on radiance is one of single paths.
+fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
+    let hindered = [Feature::Motion, Feature::Deformation, Feature::Opacity, Feature::Absorption]
+        .into_iter()
+        .any(|feature| requirements.has(feature));
+    if hindered || settings.clamp_indirect.is_some() { 1 } else { settings.share.clamp(1, 4) }
+}
+
 /// What an integrator begins with, whatever its generic parameters.
 pub(super) struct Begin<'a> {
     pub(super) scene: SceneView<'a>,
@@ -113,6 +129,7 @@ impl<'a> Begin<'a> {
             scene: self.scene,
             max_depth: self.settings.max_depth,
             roulette_depth: self.settings.roulette_depth,
+            roulette_gain: self.settings.roulette_gain,
             clamp_indirect: self.settings.clamp_indirect,
             wants_first_hit: self.first_hit,
             origin: self.origin.0,
@@ -143,6 +160,20 @@ fn fill<const OPACITY: bool, const ABSORPTION: bool>(
 }
 
 fn render_tile<const OPACITY: bool, const ABSORPTION: bool>(
+    buffer: TileBuffer,
+    tile: Tile,
+    tracer: &PathTracer<OPACITY, ABSORPTION>,
+    job: &Job,
+) -> Option<(TileBuffer, PathCounters)> {
+    if job.share > 1 {
+        render_groups(buffer, tile, tracer, job)
+    } else {
+        render_pixels(buffer, tile, tracer, job)
+    }
+}
+
+/// Pixel by pixel, each with all its samples.
+fn render_pixels<const OPACITY: bool, const ABSORPTION: bool>(
     mut buffer: TileBuffer,
     tile: Tile,
     tracer: &PathTracer<OPACITY, ABSORPTION>,
@@ -151,25 +182,123 @@ fn render_tile<const OPACITY: bool, const ABSORPTION: bool>(
     let mut counters = PathCounters::default();
     let mut reported = 0;
     for y in tile.y0..tile.y1 {
-        if job.control.cancel.load(Relaxed) {
-            return None;
-        }
         for x in tile.x0..tile.x1 {
             for index in 0..job.settings.samples {
-                let sampler = Sampler::new(job.settings.seed, job.frame, (x, y), index);
-                let offset = job.filter.sample(sampler.two(dimension::FILM));
-                let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                let lens =
-                    if job.has_lens { sampler.two(dimension::LENS) } else { Vec2::splat(0.5) };
-                let time = if job.has_time { sampler.one(dimension::TIME) } else { 0.0 };
-                let camera_ray = tracer.scene.camera.ray(centre + offset.as_dvec2(), lens, time);
+                let (sampler, camera_ray) = job.begin(&tracer.scene, (x, y), index);
                 buffer.add(x, y, &tracer.sample(&camera_ray, &sampler, &mut counters));
             }
         }
         let samples = u64::from(tile.x1 - tile.x0) * u64::from(job.settings.samples);
-        job.control.samples_done.fetch_add(samples, Relaxed);
-        job.control.rays.fetch_add(counters.rays - reported, Relaxed);
+        if !job.go_on(samples, counters.rays - reported) {
+            return None;
+        }
         reported = counters.rays;
     }
     Some((buffer, counters))
+}
+
+/// Sample by sample, in groups of neighbouring pixels which share their paths.
+fn render_groups<const OPACITY: bool, const ABSORPTION: bool>(
+    mut buffer: TileBuffer,
+    tile: Tile,
+    tracer: &PathTracer<OPACITY, ABSORPTION>,
+    job: &Job,
+) -> Option<(TileBuffer, PathCounters)> {
+    let mut counters = PathCounters::default();
+    let mut reported = 0;
+    let mut pixels = Vec::with_capacity(LARGEST_GROUP);
+    let mut paths = Vec::with_capacity(LARGEST_GROUP);
+    let corner = Sampler::new(job.settings.seed, job.frame, (tile.x0, tile.y0), u32::MAX);
+    for index in 0..job.settings.samples {
+        let shift = corner.two(index);
+        let columns = groups(tile.x0, tile.x1, job.share, shift.x);
+        let rows = groups(tile.y0, tile.y1, job.share, shift.y);
+        for row in rows {
+            for column in columns.clone() {
+                for y in row.clone() {
+                    for x in column.clone() {
+                        let (sampler, camera_ray) = job.begin(&tracer.scene, (x, y), index);
+                        paths.push(tracer.sample_shared(&camera_ray, &sampler, &mut counters));
+                        pixels.push((x, y));
+                    }
+                }
+                tracer.connect::<LARGEST_GROUP>(&mut paths, &mut counters);
+                for (path, (x, y)) in paths.drain(..).zip(pixels.drain(..)) {
+                    buffer.add(x, y, &path.sample);
+                }
+            }
+        }
+        let samples = u64::from(tile.x1 - tile.x0) * u64::from(tile.y1 - tile.y0);
+        if !job.go_on(samples, counters.rays - reported) {
+            return None;
+        }
+        reported = counters.rays;
+    }
+    Some((buffer, counters))
+}
+
+/// Most pixels of a group: those of two sides that [`groups`] may give, with a setting of 4.
+const LARGEST_GROUP: usize = 49;
+
+/// Divides `begin..end` into runs of `side`, the first and the last between half as long and less than
+/// twice as long; `shift` in `[0, 1)` moves the borders.
+fn groups(
+    begin: u32,
+    end: u32,
+    side: u32,
+    shift: f32,
+) -> impl Iterator<Item = std::ops::Range<u32>> + Clone {
+    let shortest = side.div_ceil(2);
+    let first = shortest + (shift * side as f32) as u32;
+    let mut next = begin;
+    std::iter::from_fn(move || {
+        let start = next;
+        let length = if start == begin { first } else { side };
+        next = if start + length + shortest > end { end } else { start + length };
+        (start < end).then_some(start..next)
+    })
+}
+
+impl Job<'_> {
+    /// The random numbers and the camera ray of a sample.
+    #[inline]
+    fn begin(&self, scene: &SceneView, pixel: (u32, u32), index: u32) -> (Sampler, CameraRay) {
+        let sampler = Sampler::new(self.settings.seed, self.frame, pixel, index);
+        let offset = self.filter.sample(sampler.two(dimension::FILM));
+        let centre = DVec2::new(f64::from(pixel.0) + 0.5, f64::from(pixel.1) + 0.5);
+        let lens = if self.has_lens { sampler.two(dimension::LENS) } else { Vec2::splat(0.5) };
+        let time = if self.has_time { sampler.one(dimension::TIME) } else { 0.0 };
+        (sampler, scene.camera.ray(centre + offset.as_dvec2(), lens, time))
+    }
+
+    /// Tells what was done, and whether the render is to go on.
+    fn go_on(&self, samples: u64, rays: u64) -> bool {
+        self.control.samples_done.fetch_add(samples, Relaxed);
+        self.control.rays.fetch_add(rays, Relaxed);
+        !self.control.cancel.load(Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pixel is in one group, and no group is larger than there is room for.
+    #[test]
+    fn groups_cover_a_row_once() {
+        for length in 1..70 {
+            for side in 2..=4 {
+                for shift in [0.0, 0.3, 0.7, 1.0_f32.next_down()] {
+                    let runs: Vec<_> = groups(5, 5 + length, side, shift).collect();
+                    let pixels: Vec<u32> = runs.iter().cloned().flatten().collect();
+                    assert_eq!(pixels, (5..5 + length).collect::<Vec<u32>>());
+                    for run in &runs {
+                        assert!(run.len() * run.len() <= LARGEST_GROUP, "{side} {shift}: {run:?}");
+                        let least = side.div_ceil(2).min(length) as usize;
+                        assert!(run.len() >= least, "{length} {side} {shift}: {run:?}");
+                    }
+                }
+            }
+        }
+    }
 }

@@ -6,6 +6,7 @@ mod path;
 mod photon_passes;
 mod radius;
 mod scene_view;
+mod share;
 mod vertex;
 
 pub use film_pass::{IntegrateStatus, render_film};

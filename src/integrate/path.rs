@@ -14,6 +14,7 @@
 //! survive, which keeps the mean.
 
 use super::SceneView;
+use super::share::{Departure, Landing, SharedPath};
 use super::vertex::Vertex;
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
@@ -37,6 +38,8 @@ pub struct PathTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
     pub max_depth: u32,
     /// Interactions before roulette may end a path.
     pub roulette_depth: u32,
+    /// A path survives with the probability of this times its throughput.
+    pub roulette_gain: f32,
     /// Upper limit of a sample's radiance after its first bounce.
     pub clamp_indirect: Option<f32>,
     /// Whether the film wants to know what the camera ray met first.
@@ -71,7 +74,70 @@ pub(super) enum Arrival {
     Drawn { from: Receiver, pdf: f32 },
 }
 
-impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORPTION> {
+/// A path on its way.
+struct Path<'a> {
+    ray: Ray,
+    radiance: Rgb,
+    throughput: Rgb,
+    /// Product of the η² by which refraction has scaled the throughput so far, inverted.
+    eta_scale: f32,
+    arrival: Arrival,
+    first_hit: Option<FirstHit>,
+    inside: u32,
+    /// Surface interactions.
+    depth: u32,
+    /// Surfaces met: those which let the ray pass count only here.
+    met: u32,
+    departure: Option<Departure<'a>>,
+    landing: Option<Landing>,
+    /// Radiance gathered before the landing, and the throughput there.
+    before: Rgb,
+    throughput_before: Rgb,
+    /// What roulette between departure and landing multiplied the path by.
+    boost: f32,
+}
+
+impl<'a> Path<'a> {
+    fn new(camera_ray: &CameraRay) -> Self {
+        Self {
+            ray: camera_ray.ray,
+            radiance: Rgb::ZERO,
+            throughput: Rgb::ONE,
+            eta_scale: 1.0,
+            arrival: Arrival::Sure,
+            first_hit: None,
+            inside: NOTHING,
+            depth: 0,
+            met: 0,
+            departure: None,
+            landing: None,
+            before: Rgb::ZERO,
+            throughput_before: Rgb::ONE,
+            boost: 1.0,
+        }
+    }
+
+    /// The throughput from the camera on.
+    fn carried<const SHARE: bool>(&self) -> Rgb {
+        if SHARE { self.throughput * self.throughput_before } else { self.throughput }
+    }
+
+    /// Whether the path has just left its departure.
+    fn is_between(&self) -> bool {
+        self.landing.is_none() && self.departure.as_ref().is_some_and(|d| d.depth + 1 == self.depth)
+    }
+
+    /// Keeps the surface that was reached from the departure, if it may be shared.
+    fn land(&mut self, surface: &SurfacePoint, wo: Vec3, bsdf: &Bsdf) {
+        let Some(departure) = self.departure.as_ref().filter(|_| self.is_between()) else { return };
+        let Some(landing) = Landing::new(surface, wo, bsdf, departure) else { return };
+        self.landing = Some(landing);
+        self.before = std::mem::take(&mut self.radiance);
+        self.throughput_before = std::mem::replace(&mut self.throughput, Rgb::ONE);
+    }
+}
+
+impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, ABSORPTION> {
     /// The radiance which arrives along a camera ray.
     pub fn sample(
         &self,
@@ -79,34 +145,60 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> PixelSample {
-        let mut ray = camera_ray.ray;
-        let mut radiance = Rgb::ZERO;
-        let mut throughput = Rgb::ONE;
-        // Product of the η² by which refraction has scaled the throughput so far, inverted.
-        let mut eta_scale = 1.0_f32;
-        let mut arrival = Arrival::Sure;
-        let mut first_hit = None;
-        let mut inside = NOTHING;
-        // Surface interactions, and surfaces met: those which let the ray pass count only here.
-        let mut depth = 0;
-        let mut met = 0;
+        let mut path = Path::new(camera_ray);
+        self.follow::<false>(&mut path, camera_ray, sampler, counters);
+        PixelSample { radiance: path.radiance, first_hit: path.first_hit }
+    }
+
+    /// Like [`PathTracer::sample`], with what neighbours may use of the path kept apart.
+    pub(super) fn sample_shared(
+        &self,
+        camera_ray: &CameraRay,
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> SharedPath<'a> {
+        let mut path = Path::new(camera_ray);
+        self.follow::<true>(&mut path, camera_ray, sampler, counters);
+        let Path { radiance, first_hit, departure, mut landing, before, boost, .. } = path;
+        let radiance = match &mut landing {
+            Some(landing) => {
+                landing.leaving = radiance * boost;
+                before
+            }
+            None => radiance,
+        };
+        SharedPath { sample: PixelSample { radiance, first_hit }, departure, landing }
+    }
+
+    /// Follows a path to its end.
+    ///
+    /// With `SHARE` the first surface that scatters at random is kept as the place of departure, and if
+    /// the next one is diffuse it is kept as the landing: what leaves it is gathered as if the path
+    /// had begun there, and what it had gathered before is put aside.
+    fn follow<const SHARE: bool>(
+        &self,
+        path: &mut Path<'a>,
+        camera_ray: &CameraRay,
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) {
         loop {
             counters.rays += 1;
-            let from_camera = met == 0;
-            let Some(hit) = self.scene.geometry.closest_hit(&ray, f64::INFINITY, from_camera)
+            let from_camera = path.met == 0;
+            let Some(hit) = self.scene.geometry.closest_hit(&path.ray, f64::INFINITY, from_camera)
             else {
-                let light = self.infinite(&ray, arrival);
-                radiance += self.limited(throughput * light, depth);
+                let light = self.infinite(&path.ray, path.arrival);
+                path.radiance += self.limited(path.throughput * light, path.depth);
                 break;
             };
-            let dimensions = dimension::vertex(met);
-            met += 1;
-            let surface = self.scene.geometry.surface(&ray, &hit);
+            let dimensions = dimension::vertex(path.met);
+            path.met += 1;
+            let surface = self.scene.geometry.surface(&path.ray, &hit);
             let instance = &self.scene.geometry.instances[hit.instance as usize];
             let materials = &self.scene.surfaces.materials;
-            let wo = -ray.d;
+            let wo = -path.ray.d;
             if ABSORPTION {
-                throughput *= self.transmittance(inside, hit.t);
+                path.throughput *= self.transmittance(path.inside, hit.t);
             }
             // One number decides whether the ray passes through a hole and, stretched back to the
             // whole interval, whether the path goes on.
@@ -116,68 +208,100 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
                 if opacity < 1.0 {
                     let u = sampler.one(dimensions + dimension::ROULETTE);
                     if u >= opacity {
-                        ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                        let SurfacePoint { p, p_error, ng, .. } = surface;
+                        path.ray.o = offset_ray_origin(p, p_error, ng, path.ray.d);
                         continue;
                     }
                     roulette = Some(u / opacity);
                 }
             }
-            let emitted = self.emitted(&hit, &surface, wo, ray.time, arrival);
-            radiance += self.limited(throughput * emitted, depth);
-
-            let mut lobe = sampler.one(dimensions + dimension::LOBE);
-            let bsdf = (instance.material != NOTHING)
-                .then(|| materials.bsdf(instance.material, surface.uv, &mut lobe));
-            if self.wants_first_hit && depth == 0 && first_hit.is_none() {
-                first_hit = Some(self.first_hit(camera_ray, &ray, &hit, &surface, bsdf.as_ref()));
+            if instance.emission != NOTHING {
+                let emitted = self.emitted(&hit, &surface, wo, path.ray.time, path.arrival);
+                path.radiance += self.limited(path.throughput * emitted, path.depth);
             }
-            let Some(bsdf) = bsdf else { break };
-            if depth == self.max_depth {
+            if instance.material == NOTHING {
+                if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
+                    let first = self.first_hit(camera_ray, &path.ray, &hit, &surface, None);
+                    path.first_hit = Some(first);
+                }
+                break;
+            }
+            let mut lobe = if materials.needs_lobe(instance.material) {
+                sampler.one(dimensions + dimension::LOBE)
+            } else {
+                0.0
+            };
+            let bsdf = materials.bsdf(instance.material, surface.uv, &mut lobe);
+            if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
+                let first = self.first_hit(camera_ray, &path.ray, &hit, &surface, Some(&bsdf));
+                path.first_hit = Some(first);
+            }
+            if path.depth == self.max_depth {
                 counters.truncated += 1;
                 break;
             }
+            if SHARE {
+                path.land(&surface, wo, &bsdf);
+            }
             let vertex = Vertex::new(surface, wo, bsdf);
             let receiver = vertex.receiver();
-            if bsdf.has_non_delta() {
+            let (to_scatter, on_light) =
+                sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
+            if vertex.bsdf.has_non_delta() {
+                let choose = if self.scene.lights.has_choice() {
+                    sampler.one_fine(dimensions + dimension::LIGHT)
+                } else {
+                    0.0
+                };
                 let (wi, distance, light) =
-                    self.direct(&vertex, &receiver, sampler, dimensions, ray.time, counters);
+                    self.direct(&vertex, &receiver, choose, on_light, path.ray.time, counters);
                 let light = if ABSORPTION && light != Rgb::ZERO {
-                    let medium = self.medium_towards(wi, &vertex, instance.material, inside);
+                    let medium = self.medium_towards(wi, &vertex, instance.material, path.inside);
                     light * self.transmittance(medium, distance)
                 } else {
                     light
                 };
-                radiance += self.limited(throughput * light, depth);
+                path.radiance += self.limited(path.throughput * light, path.depth);
             }
-            let Some((wi, sample)) =
-                vertex.scatter(lobe, sampler.two(dimensions + dimension::DIRECTION))
-            else {
+            let Some((wi, sample)) = vertex.scatter(lobe, to_scatter) else {
                 break;
             };
-            throughput *= sample.weight;
-            depth += 1;
-            eta_scale *= sample.eta * sample.eta;
-            if ABSORPTION {
-                inside = self.medium_towards(wi, &vertex, instance.material, inside);
+            if SHARE && !sample.delta && path.departure.is_none() {
+                path.departure = Some(Departure {
+                    vertex: vertex.clone(),
+                    depth: path.depth,
+                    throughput: path.throughput,
+                    weight: sample.weight,
+                    pdf: sample.pdf,
+                });
             }
-            if depth >= self.roulette_depth {
-                let survival = (throughput * eta_scale).max_element().min(1.0);
+            path.throughput *= sample.weight;
+            path.depth += 1;
+            path.eta_scale *= sample.eta * sample.eta;
+            if ABSORPTION {
+                path.inside = self.medium_towards(wi, &vertex, instance.material, path.inside);
+            }
+            if path.depth >= self.roulette_depth {
+                let carried = path.carried::<SHARE>() * path.eta_scale;
+                let survival = (carried.max_element() * self.roulette_gain).min(1.0);
                 let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
                 if u >= survival || survival.is_nan() {
                     break;
                 }
-                throughput /= survival;
+                path.throughput /= survival;
+                if SHARE && path.is_between() {
+                    path.boost /= survival;
+                }
             }
-            let surface = &vertex.surface;
-            ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
-            ray.d = wi;
-            arrival = if sample.delta {
+            let SurfacePoint { p, p_error, ng, .. } = vertex.surface;
+            path.ray.o = offset_ray_origin(p, p_error, ng, wi);
+            path.ray.d = wi;
+            path.arrival = if sample.delta {
                 Arrival::Sure
             } else {
                 Arrival::Drawn { from: receiver, pdf: sample.pdf }
             };
         }
-        PixelSample { radiance, first_hit }
     }
 
     /// Light from infinitely far away along a ray which meets nothing.
@@ -223,14 +347,12 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
         &self,
         vertex: &Vertex,
         receiver: &Receiver,
-        sampler: &Sampler,
-        dimensions: u32,
+        choose: f64,
+        on_light: Vec2,
         time: f32,
         counters: &mut PathCounters,
     ) -> (Vec3, f64, Rgb) {
         const NONE: (Vec3, f64, Rgb) = (Vec3::ZERO, 0.0, Rgb::ZERO);
-        let choose = sampler.one_fine(dimensions + dimension::LIGHT);
-        let on_light = sampler.two(dimensions + dimension::LIGHT_POINT);
         let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
             return NONE;
         };
@@ -266,7 +388,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
     }
 
     /// Share of the light which passes along a segment.
-    fn visible(&self, shadow_ray: &Ray, end: f64) -> f32 {
+    pub(super) fn visible(&self, shadow_ray: &Ray, end: f64) -> f32 {
         if !OPACITY {
             return if self.scene.geometry.occluded(shadow_ray, end) { 0.0 } else { 1.0 };
         }

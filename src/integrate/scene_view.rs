@@ -1,7 +1,7 @@
 //! The tables of a frame, together, as an integrator sees them.
 
 use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
-use crate::build::light::{LightTable, Lights};
+use crate::build::light::{LightTable, Lights, ShapeLights};
 use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
@@ -14,6 +14,7 @@ pub struct SceneTables<'w> {
     top: Res<'w, TopLevel>,
     surfaces: Res<'w, Surfaces>,
     lights: Res<'w, LightTable>,
+    shapes: Res<'w, ShapeLights>,
     punctual: Res<'w, PunctualLights>,
     camera: Res<'w, ViewCamera>,
     requirements: Res<'w, Requirements>,
@@ -47,6 +48,7 @@ impl SceneTables<'_> {
             surfaces: &self.surfaces,
             lights: Lights {
                 table: &self.lights,
+                shapes: &self.shapes,
                 punctual: &self.punctual.0,
                 geometry,
                 materials: &self.surfaces.materials,

@@ -12,6 +12,7 @@ use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
 
 /// A point on a path.
+#[derive(Clone)]
 pub(super) struct Vertex<'a> {
     pub(super) surface: SurfacePoint,
     pub(super) frame: Frame,

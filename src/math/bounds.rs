@@ -3,12 +3,18 @@
 use glam::{DAffine3, DVec3, Vec3};
 
 /// An axis-aligned box in `f32`; empty when `min > max` on any axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(bytemuck::Zeroable, Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Lower corner.
     pub min: Vec3,
     /// Upper corner.
     pub max: Vec3,
+}
+
+impl Default for Aabb {
+    fn default() -> Self {
+        Self::EMPTY
+    }
 }
 
 impl Aabb {

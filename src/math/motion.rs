@@ -86,6 +86,16 @@ pub enum MotionTransform {
         /// Object from world.
         inverse: DAffine3,
     },
+    /// Moving without turning or changing shape, along straight lines between places at evenly spaced
+    /// times in `[0, 1]`, both ends included; at least two.
+    Sliding {
+        /// Linear part of the map.
+        forward: DMat3,
+        /// Its inverse.
+        inverse: DMat3,
+        /// Where the origin goes.
+        places: Vec<DVec3>,
+    },
     /// Keys at evenly spaced times in `[0, 1]`, both ends included; at least two.
     Moving {
         /// World from object at each key, split.
@@ -99,6 +109,13 @@ impl MotionTransform {
         match keys {
             [] => Self::at_rest(DAffine3::IDENTITY),
             [key] => Self::at_rest(*key),
+            [first, rest @ ..] if rest.iter().all(|key| key.matrix3 == first.matrix3) => {
+                Self::Sliding {
+                    forward: first.matrix3,
+                    inverse: first.matrix3.inverse(),
+                    places: keys.iter().map(|key| key.translation).collect(),
+                }
+            }
             keys => Self::Moving { keys: keys.iter().map(Decomposed::new).collect() },
         }
     }
@@ -114,21 +131,25 @@ impl MotionTransform {
 
     /// Where the origin goes at the keys.
     pub fn keys_translations(&self) -> impl Iterator<Item = DVec3> {
-        let (rest, keys): (_, &[Decomposed]) = match self {
-            Self::Static { forward, .. } => (Some(forward.translation), &[]),
-            Self::Moving { keys } => (None, keys),
+        let (places, keys): (&[DVec3], &[Decomposed]) = match self {
+            Self::Static { forward, .. } => (std::slice::from_ref(&forward.translation), &[]),
+            Self::Sliding { places, .. } => (places, &[]),
+            Self::Moving { keys } => (&[], keys),
         };
-        rest.into_iter().chain(keys.iter().map(|key| key.translation))
+        places.iter().copied().chain(keys.iter().map(|key| key.translation))
     }
 
     /// World from object at time `u` in `[0, 1]` of the shutter.
+    #[inline]
     pub fn at(&self, u: f32) -> DAffine3 {
         match self {
             Self::Static { forward, .. } => *forward,
+            Self::Sliding { forward, places, .. } => {
+                DAffine3 { matrix3: *forward, translation: place_at(places, u) }
+            }
             Self::Moving { keys } => {
-                let position = f64::from(u) * (keys.len() - 1) as f64;
-                let first = (position as usize).min(keys.len() - 2);
-                keys[first].interpolate(&keys[first + 1], position - first as f64)
+                let (first, share) = segment(keys.len(), u);
+                keys[first].interpolate(&keys[first + 1], share)
             }
         }
     }
@@ -138,6 +159,10 @@ impl MotionTransform {
     pub fn both_at(&self, u: f32) -> (DAffine3, DAffine3) {
         match self {
             Self::Static { forward, inverse } => (*forward, *inverse),
+            Self::Sliding { inverse, .. } => {
+                let forward = self.at(u);
+                (forward, inverse_of(inverse, forward.translation))
+            }
             Self::Moving { .. } => {
                 let forward = self.at(u);
                 (forward, forward.inverse())
@@ -150,9 +175,30 @@ impl MotionTransform {
     pub fn inverse_at(&self, u: f32) -> DAffine3 {
         match self {
             Self::Static { inverse, .. } => *inverse,
+            Self::Sliding { inverse, places, .. } => inverse_of(inverse, place_at(places, u)),
             Self::Moving { .. } => self.at(u).inverse(),
         }
     }
+}
+
+/// The segment between `count` keys in which the time `u` lies, and the share of it that has passed.
+#[inline]
+fn segment(count: usize, u: f32) -> (usize, f64) {
+    let position = f64::from(u) * (count - 1) as f64;
+    let first = (position as usize).min(count - 2);
+    (first, position - first as f64)
+}
+
+#[inline]
+fn place_at(places: &[DVec3], u: f32) -> DVec3 {
+    let (first, share) = segment(places.len(), u);
+    places[first].lerp(places[first + 1], share)
+}
+
+/// The inverse of a map whose linear part has this inverse.
+#[inline]
+fn inverse_of(inverse: &DMat3, translation: DVec3) -> DAffine3 {
+    DAffine3 { matrix3: *inverse, translation: -(*inverse * translation) }
 }
 
 #[cfg(test)]
@@ -190,6 +236,27 @@ mod tests {
         assert!((p - DVec3::new(0.6_f64.sin(), 0.0, 0.6_f64.cos())).length() < 1e-14);
         let (forward, inverse) = motion.both_at(0.3);
         assert!(max_abs((forward * inverse).matrix3 - DMat3::IDENTITY) < 1e-14);
+    }
+
+    /// Oracle: the general interpolation of the same keys.
+    #[test]
+    fn sliding_is_what_moving_would_be() {
+        let places = [DVec3::X, DVec3::new(3.0, -1.0, 2.0), DVec3::new(4.0, 8.0, 1e6)];
+        let keys = places.map(|p| DAffine3 { translation: p, ..sheared() });
+        let sliding = MotionTransform::new(&keys);
+        assert!(matches!(sliding, MotionTransform::Sliding { .. }));
+        let moving = MotionTransform::Moving { keys: keys.iter().map(Decomposed::new).collect() };
+        assert!(sliding.keys_translations().eq(moving.keys_translations()));
+        for u in [0.0, 0.2, 0.5, 0.77, 1.0] {
+            let (a, b) = (sliding.at(u), moving.at(u));
+            assert!(max_abs(a.matrix3 - b.matrix3) < 1e-13, "{u}");
+            assert!((a.translation - b.translation).length() <= 1e-9, "{u}");
+            let (forward, inverse) = sliding.both_at(u);
+            assert_eq!((forward, inverse), (a, sliding.inverse_at(u)));
+            let p = DVec3::new(0.3, -0.2, 0.7);
+            let back = inverse.transform_point3(forward.transform_point3(p));
+            assert!((back - p).length() < 1e-8, "{u}: {back}");
+        }
     }
 
     /// The ends are the keys themselves, and time 1 lies inside the last segment.

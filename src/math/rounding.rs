@@ -18,16 +18,18 @@ pub const fn gamma_f64(n: u32) -> f64 {
     nu / (1.0 - nu)
 }
 
-/// Moves `x` by one unit in the last place: up for a positive direction, down for a negative one, not
-/// at all for zero.
-fn step_along(x: f32, direction: f64) -> f32 {
-    if direction > 0.0 {
-        x.next_up()
-    } else if direction < 0.0 {
-        x.next_down()
-    } else {
-        x
-    }
+/// Rounds `x` to `f32`, not against the sign of `direction`: up for a positive one, down for a negative
+/// one, to the nearest for zero. At most one unit in the last place farther than need be.
+///
+/// Half a unit in the last place of `x`, `u·|x|` or for the smallest numbers half their step, is added
+/// before the nearest number is taken, which can take away as much. `1 + 2⁻²⁰` makes up for the
+/// rounding of the sum, and for `x` crossing a power of two.
+#[inline]
+fn round_along(x: f64, direction: f64) -> f32 {
+    const HALF_UNIT: f64 = f32::EPSILON as f64 * 0.5 * (1.0 + 1.0 / 1_048_576.0);
+    let step = (x.abs() * HALF_UNIT).max(f32::MIN_POSITIVE as f64 * HALF_UNIT);
+    let step = if direction == 0.0 { 0.0 } else { step };
+    (x + step.copysign(direction)) as f32
 }
 
 /// The origin of a ray which leaves a surface, outside the error box of the hit point.
@@ -40,19 +42,20 @@ fn step_along(x: f32, direction: f64) -> f32 {
 /// The error box projected on the normal is `d = |n|·δ`; the origin moves by `d` along the normal
 /// and is then rounded away from the surface, so that the rounding cannot bring it back (Pharr,
 /// Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed., section 6.8.6).
+#[inline]
 pub fn offset_ray_origin(p: DVec3, p_error: DVec3, ng: Vec3, dir: Vec3) -> Vec3 {
     let n = ng.as_dvec3();
-    // Rounding p itself to f32 may move it half a unit in the last place along each axis; stepping
-    // one unit outward below undoes that on the axes along which the offset points.
+    // Where the offset has no component the nearest number is taken, which may move the point by half
+    // a unit in the last place; rounding along the offset undoes that on the other axes.
     let half_ulp = p.abs() * (f64::from(f32::EPSILON) * 0.5);
     let distance = n.abs().dot(p_error + half_ulp);
     let side = if dir.dot(ng) < 0.0 { -1.0 } else { 1.0 };
     let offset = n * (distance * side);
     let moved = p + offset;
     Vec3::new(
-        step_along(moved.x as f32, offset.x),
-        step_along(moved.y as f32, offset.y),
-        step_along(moved.z as f32, offset.z),
+        round_along(moved.x, offset.x),
+        round_along(moved.y, offset.y),
+        round_along(moved.z, offset.z),
     )
 }
 
@@ -66,6 +69,26 @@ mod tests {
         for (n, expected) in [(3, 1.788_14e-7), (5, 2.980_233e-7), (7, 4.172_327e-7)] {
             assert!((gamma(n) / expected - 1.0).abs() < 1e-6, "γ({n}) = {:e}", gamma(n));
         }
+    }
+
+    /// Oracle: the numbers next to the exact value, in f64.
+    #[test]
+    fn rounding_along_a_direction_never_goes_against_it() {
+        for k in 0..200_000_u32 {
+            let bits = k.wrapping_mul(0x9e37_79b9) & 0x7f7f_ffff;
+            let x = f64::from(f32::from_bits(bits)) * (1.0 + f64::from(k % 17) * 1e-8);
+            for x in [x, -x] {
+                let (up, down) = (round_along(x, 1.0), round_along(x, -1.0));
+                assert!(f64::from(up) >= x && f64::from(down) <= x, "{x:e}: {down:e}, {up:e}");
+                let near = x as f32;
+                assert!(
+                    up <= near.next_up() && down >= near.next_down(),
+                    "{x:e}: {down:e}, {up:e}"
+                );
+                assert_eq!(round_along(x, 0.0), near);
+            }
+        }
+        assert!(round_along(0.0, 1.0) > 0.0 && round_along(0.0, -1.0) < 0.0);
     }
 
     /// Oracle: the signed distance to the plane, evaluated in f64, is positive on the side of the

@@ -62,6 +62,8 @@ pub struct FrameEntry {
     pub files: Vec<String>,
     /// From the start of the frame until its files were on disk, in seconds.
     pub wall_seconds: f64,
+    /// Spent on developing the picture and writing its files, in seconds.
+    pub write_seconds: f64,
     /// The most memory that the program had used by then, in bytes.
     pub peak_memory_bytes: Option<u64>,
     /// Numbers of the beauty which exceeded 16 bits and were written as 65504.
@@ -150,6 +152,7 @@ mod tests {
             fingerprint: job.of_frame(frame),
             files: FrameEntry::file_names(&files),
             wall_seconds: 1.5,
+            write_seconds: 0.1,
             peak_memory_bytes: None,
             saturated: 0,
             report: FrameReport { frame, integrator: "Path".into(), ..Default::default() },

@@ -45,6 +45,8 @@ struct Compiled {
     kind: Kind,
     /// Whether it, or one that it is mixed of, is masked.
     has_opacity: bool,
+    /// Whether it chooses among lobes or sides.
+    needs_lobe: bool,
     /// Whether it, or the first solid that it is mixed of, encloses a medium.
     interior: Option<Interior>,
 }
@@ -211,6 +213,7 @@ impl MaterialTable {
             .map(|(index, kind)| Compiled {
                 kind: kind.clone(),
                 has_opacity: has_opacity(index as u32, &kinds),
+                needs_lobe: needs_lobe(index as u32, &kinds),
                 interior: interior(index as u32, materials),
             })
             .collect();
@@ -388,6 +391,12 @@ impl MaterialTable {
         self.materials[material as usize].interior
     }
 
+    /// Whether [`MaterialTable::bsdf`] and what it returns look at the number for the choice of a lobe.
+    #[inline]
+    pub fn needs_lobe(&self, material: u32) -> bool {
+        self.materials[material as usize].needs_lobe
+    }
+
     /// Absorption coefficient inside, per metre; `None` where nothing is absorbed.
     #[inline]
     pub fn attenuation(&self, material: u32) -> Option<Rgb> {
@@ -517,6 +526,14 @@ fn has_opacity(index: u32, kinds: &[Kind]) -> bool {
         Kind::Masked { .. } => true,
         Kind::Mix { a, b, .. } => has_opacity(*a, kinds) || has_opacity(*b, kinds),
         _ => false,
+    }
+}
+
+fn needs_lobe(index: u32, kinds: &[Kind]) -> bool {
+    match &kinds[index as usize] {
+        Kind::Diffuse { .. } | Kind::Mirror { .. } => false,
+        Kind::Masked { material, .. } => needs_lobe(*material, kinds),
+        _ => true,
     }
 }
 

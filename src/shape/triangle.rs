@@ -18,26 +18,29 @@ pub struct TriangleTest {
 
 impl TriangleTest {
     /// Prepares a ray.
+    #[inline]
     pub fn new(ray: &LocalRay) -> Self {
         let size = ray.d.abs();
-        let z = if size.x > size.y && size.x > size.z {
-            0
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let d = ray.d;
+        // Without branches, which the directions of bounced rays would mislead.
+        let x_longest = (size.x > size.y) & (size.x > size.z);
+        let z = usize::from(!x_longest) * (2 - usize::from(size.y > size.z));
+        let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
+        let d = ray.d.to_array();
         Self { o: ray.o, axes: [x, y, z], shear: DVec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]) }
     }
 
     /// The hit with `0 < t < t_max` and the weights of the second and third vertex.
     #[inline]
     pub fn intersect(&self, triangle: [Vec3; 3], t_max: f64) -> Option<(f64, DVec2)> {
+        self.intersect_exact(triangle.map(Vec3::as_dvec3), t_max)
+    }
+
+    /// The same for corners in `f64`.
+    #[inline]
+    pub fn intersect_exact(&self, triangle: [DVec3; 3], t_max: f64) -> Option<(f64, DVec2)> {
         let [kx, ky, kz] = self.axes;
         let sheared = triangle.map(|v| {
-            let v = v.as_dvec3() - self.o;
+            let v = v - self.o;
             DVec3::new(v[kx] - self.shear.x * v[kz], v[ky] - self.shear.y * v[kz], v[kz])
         });
         let [a, b, c] = sheared;

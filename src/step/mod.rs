@@ -6,11 +6,14 @@
 //! therefore be evaluated alone, and a system added by a program gets motion blur without doing
 //! anything for it.
 
+mod deform;
 mod hierarchy;
 mod pose;
 mod shutter;
 mod track;
+mod waves;
 
+pub use deform::deform_meshes;
 pub use hierarchy::propagate_poses;
 pub use pose::{PoseInput, evaluate_optics_at, local_pose, pose_moving_entities};
 pub use shutter::sample_shutter;
@@ -18,6 +21,7 @@ pub use shutter::sample_shutter;
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel, SingleThreadedExecutor};
 
+use crate::frame::{FrameSystems, StageClock, stamp};
 use crate::world::SceneTime;
 
 /// The schedule of the pose systems; it runs once for every sample of the shutter.
@@ -39,6 +43,7 @@ pub enum PoseSystems {
 /// Adds the pose schedule and the resources of this stage to the world, and its system to `frame`.
 pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(SceneTime::default());
+    world.init_resource::<StageClock>();
     let mut poses = Schedule::new(Pose);
     poses.set_executor(SingleThreadedExecutor::new());
     let ambiguity_detection = LogLevel::Error;
@@ -51,5 +56,6 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         propagate_poses.in_set(PoseSystems::Propagate),
     ));
     world.add_schedule(poses);
-    frame.add_systems(sample_shutter.in_set(crate::frame::FrameSystems::Step));
+    let systems = (sample_shutter, stamp("poses"), deform_meshes, stamp("deformation"));
+    frame.add_systems(systems.chain().in_set(FrameSystems::Step));
 }

@@ -27,29 +27,39 @@ pub struct PoseInput {
     is_light: Has<Light>,
 }
 
+/// What moves an entity by itself.
+type Animated = Or<(With<Velocity>, With<Acceleration>, With<Keyframes>, With<LookAt>)>;
+/// A change of an entity that nothing moves by itself.
+type Edited = (
+    Changed<Transform>,
+    Without<Velocity>,
+    Without<Acceleration>,
+    Without<Keyframes>,
+    Without<LookAt>,
+);
+
 /// Writes the [`LocalPose`] of every entity for the instant of [`SceneTime`].
 ///
 /// What stands still is left untouched, so that `Changed<LocalPose>` downstream means "moved".
 pub fn pose_moving_entities(
     time: Res<SceneTime>,
-    mut entities: Query<(PoseInput, Ref<Transform>, &mut LocalPose)>,
+    mut animated: Query<(PoseInput, &mut LocalPose), Animated>,
+    mut edited: Query<(&Transform, &mut LocalPose), Edited>,
 ) {
-    for (input, transform, mut pose) in &mut entities {
-        let animated = input.velocity.is_some()
-            || input.acceleration.is_some()
-            || input.keyframes.is_some()
-            || input.look_at.is_some();
-        if animated || transform.is_changed() {
-            let now = LocalPose(local_pose(
-                time.seconds,
-                input.transform,
-                input.velocity,
-                input.acceleration,
-                input.keyframes,
-                input.look_at.map(|aim| (aim, input.is_camera || input.is_light)),
-            ));
-            pose.set_if_neq(now);
-        }
+    for (input, mut pose) in &mut animated {
+        let now = local_pose(
+            time.seconds,
+            input.transform,
+            input.velocity,
+            input.acceleration,
+            input.keyframes,
+            input.look_at.map(|aim| (aim, input.is_camera || input.is_light)),
+        );
+        pose.set_if_neq(LocalPose(now));
+    }
+    for (transform, mut pose) in &mut edited {
+        let now = local_pose(time.seconds, transform, None, None, None, None);
+        pose.set_if_neq(LocalPose(now));
     }
 }
 

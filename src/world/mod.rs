@@ -1,6 +1,7 @@
 //! Components and resources, and spawning a description into a world.
 
 mod components;
+mod deformation;
 mod resources;
 mod spawn;
 
@@ -9,5 +10,7 @@ pub use components::{
     HiddenFromCamera, Keyframes, Light, LocalPose, LookAt, MadeOf, Material, Mesh, Name, Optics,
     Shape, ShutterMotion, Texture, Transform, Velocity, WorldTransform,
 };
+pub(crate) use deformation::ShutterSpan;
+pub use deformation::{Deformation, VertexMotion, Vertices};
 pub use resources::{FrameClock, SceneTime, Settings};
 pub use spawn::{SceneEntities, spawn_scene};

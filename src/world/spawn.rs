@@ -1,8 +1,8 @@
 //! From a description to a world: names become entities.
 
 use super::{
-    ActiveCamera, Camera, ChildOf, Emission, FrameClock, HiddenFromCamera, Light, MadeOf, Material,
-    Mesh, Name, Settings, Shape, Texture,
+    ActiveCamera, Camera, ChildOf, Deformation, Emission, FrameClock, HiddenFromCamera, Light,
+    MadeOf, Material, Mesh, Name, Settings, Shape, Texture,
 };
 use crate::description::{EntityDescription, SceneDescription};
 use bevy_ecs::prelude::*;
@@ -48,6 +48,9 @@ pub fn spawn_scene(world: &mut World, scene: &SceneDescription) -> SceneEntities
     }
     for (name, mesh) in &scene.meshes {
         world.entity_mut(spawned.meshes[name]).insert(Mesh::new(mesh.clone()));
+    }
+    for (name, waves) in &scene.waves {
+        world.entity_mut(spawned.meshes[name]).insert(Deformation::Waves(waves.clone()));
     }
     for (name, material) in &scene.materials {
         let mut texture = |name: String| Ok(entity(&spawned.textures, &name));

@@ -1,108 +1,12 @@
-//! Two levels: a tree per mesh in the mesh's own space, and a tree over the instances of a frame.
+//! What rays meet: the objects of a frame and their trees.
 
-use super::{Bvh, WideTree};
-use crate::description::TriangleMesh;
-use crate::extract::{Geometry, Instance, Instances, Meshes};
-use crate::math::{Aabb, MotionTransform, Ray};
+use super::top::{Joined, RESTING};
+use super::{MeshTree, TopLevel};
+use crate::extract::{Geometry, Instance};
+use crate::math::{MotionTransform, Ray};
 use crate::shape::LocalRay;
-use bevy_ecs::prelude::*;
-use glam::{DAffine3, DVec2, Vec3};
-use rayon::prelude::*;
+use glam::{DAffine3, DVec2};
 use std::sync::Arc;
-
-/// Share of references that cutting large triangles may add to the tree of a mesh.
-const SPLIT_BUDGET: f32 = 0.1;
-/// Most instances in a leaf of the top level: a test of one costs a change of space.
-const INSTANCES_PER_LEAF: usize = 1;
-
-/// A mesh with its tree.
-#[derive(Clone, Debug)]
-pub struct MeshTree {
-    /// The triangles.
-    pub mesh: Arc<TriangleMesh>,
-    tree: WideTree,
-}
-
-impl MeshTree {
-    /// Builds the tree of a mesh.
-    pub fn build(mesh: Arc<TriangleMesh>) -> Self {
-        let tree = WideTree::build(&mesh, SPLIT_BUDGET);
-        Self { mesh, tree }
-    }
-
-    /// The corners of a triangle.
-    #[inline]
-    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.mesh.triangles[triangle as usize].map(|k| self.mesh.positions[k as usize])
-    }
-}
-
-/// The trees of all meshes, by the index of the mesh.
-#[derive(Resource, Clone, Debug, Default)]
-pub struct MeshTrees {
-    /// The trees.
-    pub list: Vec<Arc<MeshTree>>,
-    /// How many were built in this frame.
-    pub built: usize,
-}
-
-/// Builds the trees of new meshes and drops those of removed ones.
-pub fn rebuild_mesh_trees(meshes: Res<Meshes>, mut trees: ResMut<MeshTrees>) {
-    if !meshes.is_changed() {
-        if trees.built != 0 {
-            trees.bypass_change_detection().built = 0;
-        }
-        return;
-    }
-    let old = std::mem::take(&mut trees.list);
-    let kept = |mesh: &Arc<TriangleMesh>| old.iter().find(|tree| Arc::ptr_eq(&tree.mesh, mesh));
-    trees.built = meshes.list.iter().filter(|mesh| kept(mesh).is_none()).count();
-    trees.list = meshes
-        .list
-        .par_iter()
-        .map(|mesh| kept(mesh).cloned().unwrap_or_else(|| Arc::new(MeshTree::build(mesh.clone()))))
-        .collect();
-}
-
-/// The tree over the instances of a frame. Planes have no bounds and are kept beside it.
-#[derive(Resource, Clone, Debug, Default)]
-pub struct TopLevel {
-    tree: Bvh,
-    unbounded: Vec<u32>,
-    /// Whether it was built anew in this frame.
-    pub built: bool,
-}
-
-impl TopLevel {
-    /// Builds the tree over `instances`.
-    pub fn build(instances: &[Instance]) -> Self {
-        let boxes: Vec<Aabb> = instances
-            .iter()
-            .map(|i| if i.bounds.min.is_finite() { i.bounds } else { Aabb::EMPTY })
-            .collect();
-        let unbounded =
-            (0..).zip(instances).filter(|(_, i)| !i.bounds.min.is_finite()).map(|(k, _)| k);
-        Self {
-            tree: Bvh::build(&boxes, INSTANCES_PER_LEAF),
-            unbounded: unbounded.collect(),
-            built: true,
-        }
-    }
-
-    /// The box around all instances which have bounds.
-    pub fn bounds(&self) -> Aabb {
-        self.tree.bounds()
-    }
-}
-
-/// Builds the top level anew when an instance changed.
-pub fn rebuild_top_level(instances: Res<Instances>, mut top: ResMut<TopLevel>) {
-    if instances.is_changed() {
-        *top = TopLevel::build(&instances.list);
-    } else if top.built {
-        top.bypass_change_detection().built = false;
-    }
-}
 
 /// Where a ray meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,12 +46,19 @@ impl SceneGeometry<'_> {
     pub fn closest_hit(&self, ray: &Ray, t_max: f64, from_camera: bool) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut visit = |index: u32, t_max: f64| {
-            let instance = &self.instances[index as usize];
-            if from_camera && instance.hidden_from_camera {
-                return t_max;
-            }
             // Equal distances are let through, so that the tie is decided by `precedes`.
-            if let Some(hit) = self.hit_instance(index, instance, ray, t_max.next_up())
+            let end = t_max.next_up();
+            let hit = match (index, &self.top.joined) {
+                (RESTING, Some(joined)) => hit_joined(joined, ray, end),
+                _ => {
+                    let instance = &self.instances[index as usize];
+                    if from_camera && instance.hidden_from_camera {
+                        return t_max;
+                    }
+                    self.hit_instance(index, instance, ray, end)
+                }
+            };
+            if let Some(hit) = hit
                 && best.is_none_or(|best| hit.precedes(&best))
             {
                 best = Some(hit);
@@ -156,7 +67,7 @@ impl SceneGeometry<'_> {
         };
         // Strictly before the end of the ray.
         let mut limit = t_max.next_down();
-        for &index in &self.top.unbounded {
+        for &index in &self.top.always {
             limit = visit(index, limit);
         }
         self.top.tree.traverse(&whole(ray), limit, visit);
@@ -167,10 +78,15 @@ impl SceneGeometry<'_> {
     pub fn occluded(&self, ray: &Ray, t_max: f64) -> bool {
         let mut blocked = false;
         let mut visit = |index: u32, t_max: f64| {
-            blocked = self.blocks(&self.instances[index as usize], ray, t_max);
+            blocked = match (index, &self.top.joined) {
+                (RESTING, Some(joined)) => {
+                    joined.tree.any_hit(&shifted(ray, joined), ray.time, t_max)
+                }
+                _ => self.blocks(&self.instances[index as usize], ray, t_max),
+            };
             if blocked { 0.0 } else { t_max }
         };
-        for &index in &self.top.unbounded {
+        for &index in &self.top.always {
             if visit(index, t_max) <= 0.0 {
                 return true;
             }
@@ -191,12 +107,9 @@ impl SceneGeometry<'_> {
                 weights: DVec2::ZERO,
             }),
             Geometry::Mesh(mesh) => {
-                self.meshes[mesh as usize].tree.closest_hit(&local, t_max).map(|hit| Hit {
-                    t: hit.t,
-                    instance: index,
-                    primitive: hit.triangle,
-                    weights: hit.weights,
-                })
+                let hit = self.meshes[mesh as usize].closest_hit(&local, ray.time, t_max)?;
+                let (primitive, weights) = (hit.triangle, hit.weights);
+                Some(Hit { t: hit.t, instance: index, primitive, weights })
             }
         }
     }
@@ -207,9 +120,23 @@ impl SceneGeometry<'_> {
         let local = to_instance(instance, ray);
         match instance.geometry {
             Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).is_some(),
-            Geometry::Mesh(mesh) => self.meshes[mesh as usize].tree.any_hit(&local, t_max),
+            Geometry::Mesh(mesh) => self.meshes[mesh as usize].any_hit(&local, ray.time, t_max),
         }
     }
+}
+
+/// The nearest hit of the resting meshes with `0 < t < t_max`.
+#[inline]
+fn hit_joined(joined: &Joined, ray: &Ray, t_max: f64) -> Option<Hit> {
+    let hit = joined.tree.closest_hit(&shifted(ray, joined), ray.time, t_max)?;
+    let (instance, primitive) = joined.members.owner(hit.triangle);
+    Some(Hit { t: hit.t, instance, primitive, weights: hit.weights })
+}
+
+/// The ray in the space of the resting meshes.
+#[inline]
+fn shifted(ray: &Ray, joined: &Joined) -> LocalRay {
+    LocalRay { o: ray.o.as_dvec3() - joined.shift, d: ray.d.as_dvec3() }
 }
 
 /// The ray in render space in `f64`.
@@ -222,7 +149,7 @@ fn whole(ray: &Ray) -> LocalRay {
 fn to_instance(instance: &Instance, ray: &Ray) -> LocalRay {
     match &instance.motion {
         MotionTransform::Static { inverse, .. } => local_ray(inverse, ray),
-        moving @ MotionTransform::Moving { .. } => local_ray(&moving.inverse_at(ray.time), ray),
+        moving => local_ray(&moving.inverse_at(ray.time), ray),
     }
 }
 

@@ -1,14 +1,23 @@
-//! Bounding volume hierarchies: one per mesh, kept over frames, of eight-fold nodes ([`WideTree`]), and
-//! one per frame over instances ([`Bvh`]).
+//! Bounding volume hierarchies, of eight-fold nodes.
+//!
+//! * A [`WideTree`] per mesh, in the mesh's own space, kept over frames.
+//! * One more over all meshes which stand still and are used once ([`RestingTree`]).
+//! * A tree over the objects of a frame ([`TopLevel`]), whose leaves lead to these and to analytic shapes.
+//!
+//! [`Bvh`] is the binary tree that the top level is made from.
 
 mod geometry;
+mod mesh_tree;
+mod resting;
 mod surface;
+mod top;
 mod tree;
 mod wide;
 
-pub use geometry::{
-    Hit, MeshTree, MeshTrees, SceneGeometry, TopLevel, rebuild_mesh_trees, rebuild_top_level,
-};
+pub use geometry::{Hit, SceneGeometry};
+pub use mesh_tree::{MeshTree, MeshTrees, rebuild_mesh_trees};
+pub use resting::{RestingTree, join_resting_meshes};
 pub use surface::SurfacePoint;
+pub use top::{TopLevel, rebuild_top_level};
 pub use tree::Bvh;
-pub use wide::{TriangleHit, WideTree};
+pub use wide::{MovingTree, TriangleHit, WideTree};

@@ -1,7 +1,10 @@
 //! The surface where a ray hit it, in render space.
 
+use super::resting::point_error;
+use super::top::Joined;
 use super::{Hit, MeshTree, SceneGeometry};
-use crate::extract::Geometry;
+use crate::description::TriangleMesh;
+use crate::extract::{Geometry, Instance};
 use crate::math::{Frame, MotionTransform, Ray};
 use crate::shape::{LocalSurface, rounding_error};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
@@ -54,6 +57,11 @@ impl SceneGeometry<'_> {
     /// The surface where `ray` hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let instance = &self.instances[hit.instance as usize];
+        if let (Some(joined), Geometry::Mesh(mesh)) = (&self.top.joined, instance.geometry)
+            && let Some(first) = joined.members.first_triangle(hit.instance)
+        {
+            return joined.surface(&self.meshes[mesh as usize], first, hit, instance);
+        }
         let surface = |forward: &DAffine3, inverse: &DAffine3| {
             let local = match instance.geometry {
                 Geometry::Primitive(primitive) => {
@@ -61,14 +69,15 @@ impl SceneGeometry<'_> {
                     primitive.surface(p, hit.primitive, instance.needs_uv)
                 }
                 Geometry::Mesh(mesh) => {
-                    self.meshes[mesh as usize].surface(hit.primitive, hit.weights)
+                    let mesh = &self.meshes[mesh as usize];
+                    mesh.surface(hit.primitive, hit.weights, ray.time, instance.needs_uv)
                 }
             };
             SurfacePoint::new(&local, forward, inverse)
         };
         match &instance.motion {
             MotionTransform::Static { forward, inverse } => surface(forward, inverse),
-            moving @ MotionTransform::Moving { .. } => {
+            moving => {
                 let (forward, inverse) = moving.both_at(ray.time);
                 surface(&forward, &inverse)
             }
@@ -77,52 +86,116 @@ impl SceneGeometry<'_> {
 
     /// Where the point of the surface that `ray` hit is at another time of the shutter.
     pub fn point_at(&self, ray: &Ray, hit: &Hit, time: f32) -> DVec3 {
-        let motion = &self.instances[hit.instance as usize].motion;
-        motion
-            .at(time)
-            .transform_point3(motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)))
+        let Instance { motion, geometry, .. } = &self.instances[hit.instance as usize];
+        let local = match geometry {
+            Geometry::Mesh(mesh) if self.meshes[*mesh as usize].deforms() => {
+                let corners = self.meshes[*mesh as usize].corners(hit.primitive, time);
+                Facet::new(corners, hit.weights).p
+            }
+            _ => motion.inverse_at(ray.time).transform_point3(ray.at(hit.t)),
+        };
+        motion.at(time).transform_point3(local)
+    }
+}
+
+impl Joined {
+    /// The surface of a triangle of an instance whose first triangle in the shared tree is `first`.
+    fn surface(&self, tree: &MeshTree, first: u32, hit: &Hit, instance: &Instance) -> SurfacePoint {
+        let corners = self.tree.corners(first + hit.primitive, 0.0);
+        let facet = Facet::new(corners, hit.weights);
+        let MotionTransform::Static { forward, inverse } = &instance.motion else {
+            unreachable!("what moves is not joined");
+        };
+        // A mirroring map turns the order of the corners: the outside stays outside.
+        let outward = if forward.matrix3.determinant() < 0.0 { -facet.ng } else { facet.ng };
+        let ng = outward.normalize().as_vec3();
+        let ns = interpolated(tree.normals(hit.primitive, 0.0), hit.weights)
+            .map(|n| (inverse.matrix3.transpose() * n).normalize())
+            .filter(|n| n.is_finite())
+            .map_or(ng, DVec3::as_vec3);
+        let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
+        let (uv, dpdu) = if instance.needs_uv {
+            facet.parameters(&tree.mesh, hit.primitive, hit.weights)
+        } else {
+            (Vec2::ZERO, DVec3::ZERO)
+        };
+        let p = facet.p + self.shift;
+        let p_error = point_error(corners, self.shift, p);
+        SurfacePoint { p, p_error, ng, ns, uv, dpdu: dpdu.as_vec3() }
     }
 }
 
 impl MeshTree {
-    /// The surface of a triangle at these weights of its second and third corner.
-    pub fn surface(&self, triangle: u32, weights: DVec2) -> LocalSurface {
-        let corners = self.corners(triangle).map(Vec3::as_dvec3);
-        let [a, b, c] = corners;
-        let barycentric = [1.0 - weights.x - weights.y, weights.x, weights.y];
-        // Both edges in units of the longest component: their product neither under- nor overflows.
-        let (e1, e2) = (b - a, c - a);
-        let size = e1.abs().max(e2.abs()).max_element();
-        let ng = (e1 / size).cross(e2 / size);
-        let indices = self.mesh.triangles[triangle as usize];
-        let ns = if self.mesh.normals.is_empty() {
-            ng
+    /// The surface of a triangle at these weights of its second and third corner, at a time in the
+    /// shutter. Texture coordinates are left out, and uv is 0, unless `needs_uv`.
+    pub fn surface(
+        &self,
+        triangle: u32,
+        weights: DVec2,
+        time: f32,
+        needs_uv: bool,
+    ) -> LocalSurface {
+        let facet = Facet::new(self.corners(triangle, time), weights);
+        let ns = interpolated(self.normals(triangle, time), weights).unwrap_or(facet.ng);
+        let (uv, dpdu) = if needs_uv {
+            facet.parameters(&self.mesh, triangle, weights)
         } else {
-            let sum: DVec3 = (0..3)
-                .map(|k| self.mesh.normals[indices[k] as usize].as_dvec3() * barycentric[k])
-                .sum();
-            // Opposite normals may cancel.
-            if sum.length_squared() > 0.0 { sum } else { ng }
+            (Vec2::ZERO, DVec3::ZERO)
         };
-        let uvs = if self.mesh.uvs.is_empty() {
+        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu }
+    }
+}
+
+/// A point of a triangle, with what follows from the corners alone.
+struct Facet {
+    p: DVec3,
+    /// Normal of any positive length.
+    ng: DVec3,
+    e1: DVec3,
+    e2: DVec3,
+}
+
+impl Facet {
+    #[inline]
+    fn new([a, b, c]: [DVec3; 3], weights: DVec2) -> Self {
+        let (e1, e2) = (b - a, c - a);
+        // The product of two numbers of f32 neither under- nor overflows in f64.
+        let ng = e1.cross(e2);
+        let p = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
+        Self { p, ng, e1, e2 }
+    }
+
+    /// Texture coordinates, and the direction in which u grows.
+    fn parameters(&self, mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> (Vec2, DVec3) {
+        let uvs = if mesh.uvs.is_empty() {
             [Vec2::ZERO, Vec2::X, Vec2::ONE]
         } else {
-            indices.map(|k| self.mesh.uvs[k as usize])
+            mesh.triangles[triangle as usize].map(|k| mesh.uvs[k as usize])
         };
-        let uv = (0..3).map(|k| uvs[k].as_dvec2() * barycentric[k]).sum::<DVec2>();
-        let (d1, d2) = ((uvs[1] - uvs[0]).as_dvec2(), (uvs[2] - uvs[0]).as_dvec2());
+        let [a, b, c] = uvs.map(Vec2::as_dvec2);
+        let uv = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
+        let (d1, d2) = (b - a, c - a);
         let det = d1.perp_dot(d2);
+        let (e1, e2) = (self.e1, self.e2);
         let dpdu = if det == 0.0 { e1 } else { (e1 * d2.y - e2 * d1.y) * det.signum() };
-        let p = a * barycentric[0] + b * barycentric[1] + c * barycentric[2];
-        LocalSurface { p, ng, ns, uv: uv.as_vec2(), dpdu }
+        (uv.as_vec2(), dpdu)
     }
+}
+
+/// The normal between those of the corners, of any length; `None` where there are none, or where
+/// opposite normals cancel.
+#[inline]
+fn interpolated(normals: Option<[DVec3; 3]>, weights: DVec2) -> Option<DVec3> {
+    let [a, b, c] = normals?;
+    let sum = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
+    (sum.length_squared() > 0.0).then_some(sum)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::TopLevel;
     use super::*;
-    use crate::description::TriangleMesh;
+    use crate::description::{BvhQuality, TriangleMesh};
     use crate::extract::{Instance, NOTHING};
     use crate::math::{Aabb, offset_ray_origin};
     use crate::sampling::Sampler;
@@ -139,7 +212,7 @@ mod tests {
             let positions = vec![three(0), three(3), three(6)];
             let triangles = vec![[0, 1, 2]];
             let mesh = TriangleMesh { positions, triangles, ..Default::default() };
-            let tree = Arc::new(MeshTree::build(Arc::new(mesh)));
+            let tree = Arc::new(MeshTree::build(Arc::new(mesh), BvhQuality::default()));
             let size = 10.0_f64.powf(f64::from(s.one(9)) * 12.0 - 6.0);
             let distance = 10.0_f64.powf(f64::from(s.one(10)) * 14.0 - 7.0);
             let forward = DAffine3::from_scale_rotation_translation(
@@ -165,7 +238,8 @@ mod tests {
             let scene = SceneGeometry { instances: &instances, meshes: &meshes, top: &top };
             let root = s.one(17).sqrt();
             let weights = DVec2::new(f64::from(1.0 - root), f64::from(root * s.one(18)));
-            let surface = SurfacePoint::new(&tree.surface(0, weights), &forward, &inverse);
+            let surface =
+                SurfacePoint::new(&tree.surface(0, weights, 0.0, false), &forward, &inverse);
             for k in 0..4 {
                 let d = (three(20 + 3 * k)).normalize();
                 let o = offset_ray_origin(surface.p, surface.p_error, surface.ng, d);

@@ -100,6 +100,33 @@ impl Bvh {
         self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
     }
 
+    /// The index of the root; `None` for an empty tree.
+    pub(super) fn root(&self) -> Option<usize> {
+        (!self.nodes.is_empty()).then_some(0)
+    }
+
+    /// The children of an inner node.
+    pub(super) fn children(&self, node: usize) -> Option<[usize; 2]> {
+        let Node { first, count, .. } = self.nodes[node];
+        (count == 0).then_some([first as usize, first as usize + 1])
+    }
+
+    /// The first box of a leaf.
+    pub(super) fn item(&self, node: usize) -> Option<u32> {
+        let Node { first, count, .. } = self.nodes[node];
+        (count > 0).then(|| self.order[first as usize])
+    }
+
+    /// The box of a node.
+    pub(super) fn bounds_of(&self, node: usize) -> Aabb {
+        self.nodes[node].bounds
+    }
+
+    /// Surface area of the box of a node.
+    pub(super) fn area(&self, node: usize) -> f32 {
+        self.nodes[node].bounds.area()
+    }
+
     /// Bytes held.
     pub fn memory(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>() + self.order.capacity() * size_of::<u32>()

@@ -148,8 +148,13 @@ impl Emission<'_> {
         let (map, inverse) = object.motion.both_at(self.time);
         let root = f64::from(self.numbers.point.x).sqrt();
         let weights = DVec2::new(1.0 - root, root * f64::from(self.numbers.point.y));
-        let local = self.lights.geometry.meshes[mesh as usize].surface(triangle, weights);
-        let area = triangle_area(self.lights.triangle(instance, triangle, &map));
+        let local = self.lights.geometry.meshes[mesh as usize].surface(
+            triangle,
+            weights,
+            self.time,
+            object.needs_uv,
+        );
+        let area = triangle_area(self.lights.triangle(instance, triangle, self.time, &map));
         self.surface(instance, &SurfacePoint::new(&local, &map, &inverse), area)
     }
 

@@ -11,6 +11,7 @@ use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf, uniform_sp
 use crate::shade::{MaterialTable, RenderTexture};
 use glam::{DAffine3, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::sync::Arc;
 
 /// Sky light ready to be sampled.
 #[derive(Clone, Debug)]
@@ -18,8 +19,8 @@ pub struct SkyLight {
     radiance: Value<Rgb, u32>,
     scale: f32,
     /// Density over the unit square of uv; `None` for a constant sky.
-    map: Option<Piecewise2D>,
-    /// Mean luminance of the radiance over the sphere.
+    map: Option<Arc<Piecewise2D>>,
+    /// Mean luminance of the radiance over the sphere, before the scale.
     mean: f64,
 }
 
@@ -32,7 +33,7 @@ impl SkyLight {
         };
         let map = texture.map(|texture| {
             let (width, height) = resolution(texture);
-            Piecewise2D::new(width, height, |x, y| {
+            Arc::new(Piecewise2D::new(width, height, |x, y| {
                 // A bilinear lookup shows a texel's neighbours too: the greatest of the corners and
                 // the middle keeps the density above 0 wherever the radiance is.
                 let brightest = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
@@ -47,7 +48,7 @@ impl SkyLight {
                 // Row y spans v from y/height, v = 0 at the south pole.
                 let polar = std::f64::consts::PI * (y as f64 + 0.5) / height as f64;
                 brightest * polar.sin()
-            })
+            }))
         });
         let mean = match (&radiance, &map) {
             // The mean of L·sin θ over the square is that of L over the sphere times 2/π.
@@ -55,12 +56,18 @@ impl SkyLight {
             (Value::Constant(rgb), None) => f64::from(crate::color::luminance(*rgb)),
             (Value::Texture(_), None) => 0.0,
         };
-        Self { radiance, scale, map, mean: mean * f64::from(scale) }
+        Self { radiance, scale, map, mean }
+    }
+
+    /// The same sky at another scale, when it shows this radiance: the map over its pixels is shared.
+    /// The textures must be those that it was made with.
+    pub fn rescaled(&self, radiance: &Value<Rgb, u32>, scale: f32) -> Option<Self> {
+        (self.radiance == *radiance).then(|| Self { scale, ..self.clone() })
     }
 
     /// Mean luminance over the sphere, W·m⁻²·sr⁻¹.
     pub fn mean_radiance(&self) -> f64 {
-        self.mean
+        self.mean * f64::from(self.scale)
     }
 
     /// Radiance from a unit direction in the light's own space.

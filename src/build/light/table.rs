@@ -1,14 +1,14 @@
 //! The lights of a frame, with what their choice depends on.
 
 use super::SkyLight;
+use super::bounds::{Cone, LightBounds};
 use super::choice::LightChoice;
-use super::tree::{Cone, LightBounds};
 use crate::build::bvh::{MeshTree, MeshTrees};
 use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
-    Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, SurfaceEmission,
-    Surfaces,
+    Emissions, Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights,
+    SurfaceEmission, Surfaces,
 };
 use crate::math::Aabb;
 use crate::shade::{MaterialTable, texture};
@@ -63,6 +63,11 @@ pub struct LightTable {
     pub emitted: Vec<Option<Emitted>>,
     /// For each light without a shape, its sky if it is one.
     pub(super) skies: Vec<Option<SkyLight>>,
+    /// Mean colour of each texture that an emission was asked for.
+    averages: Vec<Option<Rgb>>,
+    /// Whether lights at a place are to be chosen by power alone; read when the table is built. It is
+    /// there to measure the tree against: `cargo bench --bench lights`.
+    pub by_power: bool,
     /// Whether the table was built anew in this frame.
     pub built: bool,
 }
@@ -77,74 +82,131 @@ impl LightTable {
     pub fn is_empty(&self) -> bool {
         self.emitters.is_empty()
     }
+
+    /// Bytes held by what a light is chosen by, and by the list of lights.
+    pub fn memory(&self) -> usize {
+        self.choice.memory()
+            + self.emitters.capacity() * size_of::<Emitter>()
+            + self.emitted.capacity() * size_of::<Option<Emitted>>()
+    }
 }
 
-/// Builds [`LightTable`] anew when objects, surfaces or lights changed.
+/// Builds [`LightTable`] anew when something that shines changed, or the instances have other numbers.
+///
+/// What the textures alone decide, the maps over skies and the mean colours, is kept until a texture or
+/// a material changes.
 pub fn rebuild_light_table(
     instances: Res<Instances>,
     surfaces: Res<Surfaces>,
+    emissions: Res<Emissions>,
     punctual: Res<PunctualLights>,
     meshes: Res<MeshTrees>,
     mut table: ResMut<LightTable>,
+    mut scratch: Local<Scratch>,
 ) {
-    let emitters_may_have_moved = instances.is_changed();
-    if !(emitters_may_have_moved || surfaces.is_changed() || punctual.is_changed()) {
+    let textures = surfaces.is_changed();
+    if !(instances.emitters_rewritten
+        || emissions.is_changed()
+        || punctual.is_changed()
+        || textures)
+    {
         if table.built {
             table.bypass_change_detection().built = false;
         }
         return;
     }
-    let mut builder = Builder::default();
-    for (index, instance) in (0..).zip(&instances.list) {
-        builder.add_instance(index, instance, &surfaces, &meshes);
+    let skies = std::mem::take(&mut table.skies);
+    let table = &mut *table;
+    if textures {
+        table.averages.clear();
+        table.averages.resize(surfaces.materials.textures().len(), None);
     }
-    builder.add_punctual(&punctual.0, &surfaces.materials);
-    *table = builder.finish();
+    scratch.near.clear();
+    scratch.far.clear();
+    for list in [&mut table.first_of_instance, &mut table.of_punctual] {
+        list.clear();
+    }
+    table.emitters.clear();
+    table.emitted.clear();
+    let mut builder = Builder { table, scratch: &mut scratch, materials: &surfaces.materials };
+    for (index, instance) in (0..).zip(&instances.list) {
+        let emission = emissions.list.get(instance.emission as usize);
+        builder.add_instance(index, instance, emission, &meshes);
+    }
+    builder.add_punctual(&punctual.0, if textures { &[] } else { &skies });
+    let choose = if table.by_power { LightChoice::by_power } else { LightChoice::new };
+    table.choice = choose(&scratch.near, &scratch.far);
+    table.near_flux.clear();
+    table.near_flux.extend(scratch.near.iter().map(|light| light.flux));
+    table.far_irradiance.clone_from(&scratch.far);
+    table.built = true;
 }
 
-#[derive(Default)]
-struct Builder {
-    table: LightTable,
+/// What the choice is built from; its memory is kept over frames.
+#[derive(Debug, Default)]
+pub struct Scratch {
     near: Vec<LightBounds>,
     far: Vec<f64>,
 }
 
-impl Builder {
+struct Builder<'a> {
+    table: &'a mut LightTable,
+    scratch: &'a mut Scratch,
+    materials: &'a MaterialTable,
+}
+
+impl Builder<'_> {
     /// Adds a light which has a place; all of these come before those which have none.
     fn add_near(&mut self, emitter: Emitter, light: LightBounds) -> u32 {
-        let index = self.near.len() as u32;
+        let near = &mut self.scratch.near;
+        let index = near.len() as u32;
         self.table.emitters.push(emitter);
         // A flux beyond the range of f64 would make every other probability 0.
         let flux = if light.flux.is_finite() { light.flux } else { 0.0 };
-        self.near.push(LightBounds { flux, ..light });
+        near.push(LightBounds { flux, ..light });
         index
+    }
+
+    /// The mean of a colour over a surface.
+    fn mean_color(&mut self, value: &Value<Rgb, u32>) -> Rgb {
+        match value {
+            Value::Constant(color) => *color,
+            Value::Texture(index) => {
+                let index = *index as usize;
+                let textures = self.materials.textures();
+                let Some(known) = self.table.averages.get_mut(index) else { return Rgb::ZERO };
+                *known.get_or_insert_with(|| texture::average(&textures[index]))
+            }
+        }
     }
 
     fn add_instance(
         &mut self,
         index: u32,
         instance: &Instance,
-        surfaces: &Surfaces,
+        emission: Option<&SurfaceEmission>,
         meshes: &MeshTrees,
     ) {
-        let emission = surfaces.emissions.get(instance.emission as usize);
         let Some(emission) = emission else {
             self.table.first_of_instance.push(NOTHING);
             self.table.emitted.push(None);
             return;
         };
         let map = instance.motion.at(0.0);
-        let triangles = match instance.geometry {
-            Geometry::Primitive(_) => None,
-            Geometry::Mesh(mesh) => Some(triangles(&meshes.list[mesh as usize], &map)),
+        let (triangles, rigid) = match instance.geometry {
+            Geometry::Primitive(_) => (None, true),
+            Geometry::Mesh(mesh) => {
+                let tree = &meshes.list[mesh as usize];
+                (Some(triangles(tree, &map)), !tree.deforms())
+            }
         };
         let area = match (&triangles, instance.geometry) {
             (None, Geometry::Primitive(primitive)) => primitive.world_area(&map),
             (triangles, _) => triangles.iter().flatten().map(|triangle| triangle.area).sum(),
         };
         let emitted = emitted(emission, area);
-        let mean = f64::from(luminance(mean_color(&emitted.radiance, &surfaces.materials)))
-            * f64::from(emitted.factor);
+        let mean =
+            f64::from(luminance(self.mean_color(&emitted.radiance))) * f64::from(emitted.factor);
         let two_sided = emitted.two_sided;
         let flux_per_area = mean * PI * if two_sided { 2.0 } else { 1.0 };
         self.table.emitted.push(Some(emitted));
@@ -159,11 +221,12 @@ impl Builder {
             None if area.is_infinite() => NOTHING,
             None => self.add_near(Emitter::Shape(index), whole),
             Some(triangles) => {
-                let first = self.near.len() as u32;
+                let first = self.scratch.near.len() as u32;
                 for (k, triangle) in (0..).zip(triangles) {
                     let flux = flux_per_area * triangle.area;
                     // What moves is somewhere in the bounds of the whole, facing anywhere.
-                    let light = if instance.motion.is_static() && triangle.area > 0.0 {
+                    let at_rest = rigid && instance.motion.is_static();
+                    let light = if at_rest && triangle.area > 0.0 {
                         let cone = Cone::facing(triangle.normal);
                         LightBounds { bounds: triangle.bounds, flux, cone, two_sided }
                     } else {
@@ -177,9 +240,10 @@ impl Builder {
         self.table.first_of_instance.push(first);
     }
 
-    fn add_punctual(&mut self, lights: &[PunctualLight], materials: &MaterialTable) {
-        self.table.of_punctual = vec![NOTHING; lights.len()];
-        self.table.skies = vec![None; lights.len()];
+    /// Adds lights without a shape; the maps of skies are taken from `known` where they are there.
+    fn add_punctual(&mut self, lights: &[PunctualLight], known: &[Option<SkyLight>]) {
+        self.table.of_punctual.resize(lights.len(), NOTHING);
+        self.table.skies.resize(lights.len(), None);
         for (index, light) in (0..).zip(lights) {
             let (flux, cone) = match light.light {
                 Light::Point { intensity, power } => {
@@ -207,7 +271,11 @@ impl Builder {
             let irradiance = match light.light {
                 Light::Directional { irradiance, .. } => f64::from(luminance(irradiance)),
                 Light::Sky { radiance, scale } => {
-                    let sky = SkyLight::new(radiance, scale, materials);
+                    let sky = known
+                        .iter()
+                        .flatten()
+                        .find_map(|sky| sky.rescaled(&radiance, scale))
+                        .unwrap_or_else(|| SkyLight::new(radiance, scale, self.materials));
                     let irradiance = sky.mean_radiance() * 4.0 * PI;
                     self.table.skies[index as usize] = Some(sky);
                     irradiance
@@ -216,14 +284,8 @@ impl Builder {
             };
             self.table.of_punctual[index as usize] = self.table.emitters.len() as u32;
             self.table.emitters.push(Emitter::Punctual(index));
-            self.far.push(if irradiance.is_finite() { irradiance } else { 0.0 });
+            self.scratch.far.push(if irradiance.is_finite() { irradiance } else { 0.0 });
         }
-    }
-
-    fn finish(self) -> LightTable {
-        let choice = LightChoice::new(&self.near, &self.far);
-        let near_flux = self.near.iter().map(|light| light.flux).collect();
-        LightTable { choice, near_flux, far_irradiance: self.far, built: true, ..self.table }
     }
 }
 
@@ -237,8 +299,8 @@ struct Triangle {
 fn triangles(tree: &MeshTree, map: &DAffine3) -> Vec<Triangle> {
     let count = tree.mesh.triangles.len() as u32;
     let triangle = |triangle: u32| {
-        let corners = tree.corners(triangle);
-        let [a, b, c] = corners.map(|corner| map.transform_point3(corner.as_dvec3()));
+        let corners = tree.corners(triangle, 0.0);
+        let [a, b, c] = corners.map(|corner| map.transform_point3(corner));
         // The side that is outside stays outside under a mirroring map.
         let normal = (b - a).cross(c - a) * map.matrix3.determinant().signum();
         Triangle {
@@ -275,13 +337,4 @@ fn emitted(emission: &SurfaceEmission, area: f64) -> Emitted {
         }
     };
     Emitted { radiance, factor: emission.factor * factor as f32, two_sided }
-}
-
-fn mean_color(value: &Value<Rgb, u32>, materials: &MaterialTable) -> Rgb {
-    match value {
-        Value::Constant(color) => *color,
-        Value::Texture(index) => {
-            materials.textures().get(*index as usize).map_or(Rgb::ZERO, texture::average)
-        }
-    }
 }

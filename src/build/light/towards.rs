@@ -4,7 +4,8 @@
 //! Spheres, rectangles and triangles are drawn evenly by solid angle, other shapes evenly by area.
 //! All densities are per unit solid angle at the receiver and include the choice of the light.
 
-use super::{Emitted, Emitter, LightTable};
+use super::shapes::{RectangleLight, ShapeLight, SphereLight};
+use super::{Emitted, Emitter, LightTable, ShapeLights};
 use crate::build::bvh::{SceneGeometry, SurfacePoint};
 use crate::description::{Light, Rgb};
 use crate::extract::{Geometry, NOTHING, PunctualLight};
@@ -69,19 +70,26 @@ pub struct LightSample {
 
 impl LightSample {
     /// The segment from the receiver to the light, and the parameter of its end.
+    #[inline]
     pub fn shadow_ray(&self, from: &Receiver, time: f32) -> (Ray, f64) {
-        let o = offset_ray_origin(from.p, from.p_error, from.ng, self.wi);
-        let target = match self.end {
-            ShadowEnd::Infinity => return (Ray { o, d: self.wi, time }, f64::INFINITY),
-            ShadowEnd::Point(p) => p.as_vec3(),
-            ShadowEnd::Surface { p, p_error, n } => {
-                // The vector to the end is rounded to f32: its error joins that of the point.
-                let length = (p - from.p).length() * f64::from(gamma(2));
-                offset_ray_origin(p, p_error + DVec3::splat(length), n, -self.wi)
-            }
-        };
-        (Ray { o, d: target - o, time }, 1.0)
+        shadow_ray(from, self.wi, &self.end, time)
     }
+}
+
+/// The segment from a receiver in the unit direction `wi` to an end, and the parameter of the end.
+#[inline]
+pub fn shadow_ray(from: &Receiver, wi: Vec3, end: &ShadowEnd, time: f32) -> (Ray, f64) {
+    let o = offset_ray_origin(from.p, from.p_error, from.ng, wi);
+    let target = match *end {
+        ShadowEnd::Infinity => return (Ray { o, d: wi, time }, f64::INFINITY),
+        ShadowEnd::Point(p) => p.as_vec3(),
+        ShadowEnd::Surface { p, p_error, n } => {
+            // The vector to the end is rounded to f32: its error joins that of the point.
+            let length = (p - from.p).length() * f64::from(gamma(2));
+            offset_ray_origin(p, p_error + DVec3::splat(length), n, -wi)
+        }
+    };
+    (Ray { o, d: target - o, time }, 1.0)
 }
 
 /// The lights of a frame together with what they refer to.
@@ -89,6 +97,8 @@ impl LightSample {
 pub struct Lights<'a> {
     /// Which there are.
     pub table: &'a LightTable,
+    /// Emitting shapes at rest.
+    pub shapes: &'a ShapeLights,
     /// Lights without a shape.
     pub punctual: &'a [PunctualLight],
     /// Shapes.
@@ -127,12 +137,12 @@ impl ShapeSampling {
 }
 
 /// Whether two edges are perpendicular to the precision of `f32`.
-fn is_perpendicular(a: DVec3, b: DVec3) -> bool {
+pub(super) fn is_perpendicular(a: DVec3, b: DVec3) -> bool {
     a.dot(b).abs() <= f64::from(f32::EPSILON) * a.length() * b.length()
 }
 
 /// Whether a map keeps spheres round, to the precision of `f32`.
-fn is_similarity(map: &DAffine3) -> bool {
+pub(super) fn is_similarity(map: &DAffine3) -> bool {
     let m = &map.matrix3;
     let (x, y, z) = (m.x_axis.length(), m.y_axis.length(), m.z_axis.length());
     let tolerance = f64::from(f32::EPSILON) * x;
@@ -144,6 +154,12 @@ fn is_similarity(map: &DAffine3) -> bool {
 }
 
 impl Lights<'_> {
+    /// Whether [`Lights::sample`] looks at its number for the choice of a light.
+    #[inline]
+    pub fn has_choice(&self) -> bool {
+        self.table.emitters.len() > 1
+    }
+
     /// Draws a light and a direction towards it. `None` when the draw carries no light.
     pub fn sample(&self, from: &Receiver, time: f32, choose: f64, u: Vec2) -> Option<LightSample> {
         let (index, probability) =
@@ -161,6 +177,7 @@ impl Lights<'_> {
     }
 
     /// The radiance which a surface emits from a point towards the unit direction `wo`.
+    #[inline]
     pub fn emitted(&self, instance: u32, surface: &SurfacePoint, wo: Vec3) -> Rgb {
         match &self.table.emitted[instance as usize] {
             Some(emitted) if emitted.two_sided || surface.ng.dot(wo) > 0.0 => {
@@ -185,6 +202,15 @@ impl Lights<'_> {
         if first == NOTHING {
             return 0.0;
         }
+        let prepared = match self.shapes.of(instance) {
+            ShapeLight::Rectangle(rectangle) => Some(rectangle.pdf(from.p, q)),
+            ShapeLight::Sphere(sphere) => sphere.cone(from).map(|cone| cone.pdf()),
+            ShapeLight::Other => None,
+        };
+        if let Some(pdf) = prepared {
+            let choice = self.table.choice.probability(first, from.p.as_vec3(), from.horizon);
+            return choice * pdf as f32;
+        }
         let object = &self.geometry.instances[instance as usize];
         let map = object.motion.at(time);
         let (emitter, pdf) = match object.geometry {
@@ -203,7 +229,7 @@ impl Lights<'_> {
             }
             Geometry::Mesh(_) => (
                 first + primitive,
-                triangle_pdf(from.p, self.triangle(instance, primitive, &map), q),
+                triangle_pdf(from.p, self.triangle(instance, primitive, time, &map), q),
             ),
         };
         self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon) * pdf as f32
@@ -242,12 +268,18 @@ impl Lights<'_> {
         self.materials.color(&emitted.radiance, uv) * emitted.factor
     }
 
-    pub(super) fn triangle(&self, instance: u32, triangle: u32, map: &DAffine3) -> [DVec3; 3] {
+    pub(super) fn triangle(
+        &self,
+        instance: u32,
+        triangle: u32,
+        time: f32,
+        map: &DAffine3,
+    ) -> [DVec3; 3] {
         let Geometry::Mesh(mesh) = self.geometry.instances[instance as usize].geometry else {
             unreachable!("only meshes have triangles");
         };
-        let corners = self.geometry.meshes[mesh as usize].corners(triangle);
-        corners.map(|corner| map.transform_point3(corner.as_dvec3()))
+        let corners = self.geometry.meshes[mesh as usize].corners(triangle, time);
+        corners.map(|corner| map.transform_point3(corner))
     }
 
     fn sample_shape(
@@ -257,6 +289,17 @@ impl Lights<'_> {
         time: f32,
         u: Vec2,
     ) -> Option<LightSample> {
+        match self.shapes.of(instance) {
+            ShapeLight::Rectangle(rectangle) => {
+                return self.sample_rectangle(rectangle, instance, from, u);
+            }
+            ShapeLight::Sphere(sphere) => {
+                if let Some(cone) = sphere.cone(from) {
+                    return self.sample_sphere(sphere, &cone, instance, u);
+                }
+            }
+            ShapeLight::Other => {}
+        }
         let object = &self.geometry.instances[instance as usize];
         let Geometry::Primitive(shape) = object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(time);
@@ -283,6 +326,45 @@ impl Lights<'_> {
         self.surface_sample(instance, from, &surface, pdf)
     }
 
+    #[inline]
+    fn sample_rectangle(
+        &self,
+        rectangle: &RectangleLight,
+        instance: u32,
+        from: &Receiver,
+        u: Vec2,
+    ) -> Option<LightSample> {
+        let emitted = self.table.emitted[instance as usize].as_ref()?;
+        if !(emitted.two_sided || rectangle.faces(from.p)) {
+            return None;
+        }
+        let point = rectangle.sample(from.p, u);
+        let wi = (point.p - from.p).try_normalize()?.as_vec3();
+        let end = ShadowEnd::Surface { p: point.p, p_error: rectangle.p_error, n: rectangle.n };
+        let radiance = self.radiance_of(emitted, point.uv);
+        Some(LightSample { wi, radiance, pdf: point.pdf as f32, delta: false, end })
+    }
+
+    /// From outside, where the side of a sphere that is seen is its outside.
+    #[inline]
+    fn sample_sphere(
+        &self,
+        sphere: &SphereLight,
+        cone: &ConeOfSphere,
+        instance: u32,
+        u: Vec2,
+    ) -> Option<LightSample> {
+        let emitted = self.table.emitted[instance as usize].as_ref()?;
+        let (wi, normal) = sample_sphere(cone, u);
+        let end = ShadowEnd::Surface {
+            p: sphere.centre + normal * sphere.radius,
+            p_error: sphere.p_error,
+            n: normal.as_vec3(),
+        };
+        let radiance = self.radiance_of(emitted, Vec2::ZERO);
+        Some(LightSample { wi: wi.as_vec3(), radiance, pdf: cone.pdf() as f32, delta: false, end })
+    }
+
     fn sample_mesh(
         &self,
         instance: u32,
@@ -294,9 +376,10 @@ impl Lights<'_> {
         let object = &self.geometry.instances[instance as usize];
         let Geometry::Mesh(mesh) = object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(time);
-        let corners = self.triangle(instance, triangle, &map);
+        let corners = self.triangle(instance, triangle, time, &map);
         let weights = sample_triangle(from.p, corners, u);
-        let local = self.geometry.meshes[mesh as usize].surface(triangle, weights);
+        let local =
+            self.geometry.meshes[mesh as usize].surface(triangle, weights, time, object.needs_uv);
         let surface = SurfacePoint::new(&local, &map, &inverse);
         let pdf = triangle_pdf(from.p, corners, surface.p);
         self.surface_sample(instance, from, &surface, pdf)

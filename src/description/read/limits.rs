@@ -81,6 +81,11 @@ pub(super) const SAMPLES: Limits = closed(1.0, 1e9, "samples");
 pub(super) const DEPTH: Limits = closed(1.0, 1e6, "interactions");
 /// Interactions before Russian roulette.
 pub(super) const ROULETTE: Limits = closed(0.0, 1e6, "interactions");
+/// What the throughput is multiplied by for roulette.
+pub(super) const ROULETTE_GAIN: Limits =
+    Limits { min: 0.0, max: 1e9, open_min: true, open_max: false, unit: "" };
+/// Side of the groups of pixels which share paths.
+pub(super) const GROUP: Limits = closed(1.0, 4.0, "pixels");
 /// Anything above zero.
 pub(super) const POSITIVE: Limits =
     Limits { min: 0.0, max: 1e18, open_min: true, open_max: false, unit: "" };
@@ -109,6 +114,19 @@ pub(super) const FILTER: Limits =
 /// Motion tolerance, as a share of the way.
 pub(super) const TOLERANCE: Limits =
     Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "" };
+/// Waves per second.
+pub(super) const FREQUENCY: Limits =
+    Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "periods per second" };
+/// Acceleration of a fall.
+pub(super) const GRAVITY: Limits = Limits {
+    min: 0.0,
+    max: 1e6,
+    open_min: true,
+    open_max: false,
+    unit: "metres per second squared",
+};
+/// Cells along one side of a grid.
+pub(super) const CELLS: Limits = closed(1.0, 65_536.0, "cells");
 /// Edge of a checker's field.
 pub(super) const UV_LENGTH: Limits = closed(1e-9, 1e15, "in units of uv");
 /// Texture coordinates.

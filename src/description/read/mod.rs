@@ -22,6 +22,7 @@ mod source;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod waves;
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
 use super::scene::SceneDescription;

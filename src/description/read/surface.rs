@@ -6,9 +6,9 @@ use super::limits::{self, Limits};
 use super::source::Cursor;
 use crate::description::diagnostic::suggestion;
 use crate::description::{
-    Emission, EmissionStrength, Light, Material, Rgb, Shape, Texture, TriangleMesh, Value,
+    Emission, EmissionStrength, Light, Material, Rgb, Shape, Texture, TriangleMesh, Value, Wave,
 };
-use glam::{Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 use indexmap::IndexMap;
 use serde::Deserialize;
 
@@ -27,6 +27,21 @@ pub(super) enum MeshFile {
         #[serde(default)]
         uvs: Vec<Vec2>,
     },
+    /// The moving surface of water.
+    Waves {
+        size: DVec2,
+        cells: (u32, u32),
+        waves: Vec<Wave>,
+        #[serde(default)]
+        steepness: f64,
+        #[serde(default = "earth")]
+        gravity: f64,
+    },
+}
+
+/// The acceleration of a fall on earth, metres per second squared.
+fn earth() -> f64 {
+    9.81
 }
 
 /// Reports a name which is not defined.

@@ -15,12 +15,12 @@
 //! what that loses to further bounces is taken to reach the base, so that the sum stays 1 up to the
 //! interpolation of the table (2·10⁻³).
 
-use super::diffuse::cosine_direction;
 use super::energy::AlbedoAt;
 use super::fresnel::dielectric_reflectance;
 use super::ggx::{Ggx, reflect};
 use super::{BsdfSample, BsdfValue, mean};
 use crate::description::Rgb;
+use crate::sampling::warp::cosine_hemisphere;
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
@@ -77,7 +77,7 @@ impl SmoothPlastic {
         if u_lobe < p {
             return Some(BsdfSample::mirrored(wo, Rgb::splat(f / p)));
         }
-        let wi = cosine_direction(u);
+        let wi = cosine_hemisphere(u);
         if wi.z <= 0.0 {
             return None;
         }
@@ -118,7 +118,7 @@ impl<'t> RoughPlastic<'t> {
         let wi = if u_lobe < p {
             reflect(wo, Ggx { alpha: self.coat.alpha() }.sample_visible(wo, u))
         } else {
-            cosine_direction(u)
+            cosine_hemisphere(u)
         };
         if wi.z <= 0.0 {
             return None;

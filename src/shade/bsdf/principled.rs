@@ -18,11 +18,11 @@
 //! straight through when smooth). It is not diffuse translucency.
 
 use super::conductor::ReflectorLobe;
-use super::diffuse::cosine_direction;
 use super::fresnel::{SCHLICK_AVERAGE, normal_reflectance, schlick_weight};
 use super::ggx::reflect;
 use super::{BsdfSample, BsdfValue, SMOOTH_BELOW_ALPHA, mean};
 use crate::description::Rgb;
+use crate::sampling::warp::cosine_hemisphere;
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
@@ -160,7 +160,7 @@ impl<'t> Principled<'t> {
         }
         end += choice.diffuse;
         if u_lobe < end {
-            return self.finish(wo, cosine_direction(u), false);
+            return self.finish(wo, cosine_hemisphere(u), false);
         }
         end += choice.through;
         if u_lobe < end {

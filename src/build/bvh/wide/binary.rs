@@ -5,15 +5,21 @@
 //! Construction of SAH-based Bounding Volume Hierarchies", section 3). References with equal centres,
 //! and those in very deep nodes, are divided in halves, so that the depth is bounded for any input.
 //!
-//! A subtree over n references lies in 2n − 1 slots of its own, its left half in those which follow
-//! its root. So subtrees are built in parallel and the result is the same for any number of threads.
+//! A subtree over n references has 2n − 1 slots of its own, its left half in those which follow its
+//! root. So large subtrees are built in parallel and the result is the same for any number of threads.
+//! Small subtrees are packed at the front of their slots; the rest, about two thirds, is memory which
+//! is never touched and so never taken from the system.
 
 use super::node::BLOCK;
 use crate::math::Aabb;
+use bytemuck::Zeroable;
 use glam::{Vec3, Vec4};
 
-/// Most bins along an axis; a power of two.
-const BINS: usize = 16;
+/// Bins along an axis where there are many references, and where there are few; powers of two.
+const MANY_BINS: usize = 16;
+const FEW_BINS: usize = 8;
+/// References from which on there are many: twice as many bins as that see one each.
+const MANY: usize = 128;
 /// Nodes at this depth are halved by count, which ends 32 levels further down at the latest.
 const DEEPEST_SAH: usize = 40;
 /// Most levels of a tree.
@@ -39,6 +45,11 @@ impl Reference {
 
     pub(super) fn triangle(&self) -> u32 {
         self.min.w.to_bits()
+    }
+
+    /// Whether there is nothing in its box.
+    pub(super) fn is_empty(&self) -> bool {
+        self.min.x > self.max.x
     }
 
     #[cfg(test)]
@@ -105,49 +116,84 @@ impl Summary {
 
 /// A node of the binary tree: a leaf if it holds at most [`LEAF`] references, else its children are
 /// at the places that [`children`] gives.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
+#[repr(C)]
 pub(super) struct BinaryNode {
     pub(super) bounds: Aabb,
     /// Index of the first of its references, which are contiguous.
     pub(super) first: u32,
     /// Number of its references; 0 for a slot which is not used.
     pub(super) count: u32,
+    /// Slots from here to the root of the right subtree.
+    right: u32,
+}
+
+impl BinaryNode {
+    pub(super) fn leaf(bounds: Aabb, first: u32, count: u32) -> Self {
+        Self { bounds, first, count, right: 0 }
+    }
+
+    pub(super) fn is_inner(&self) -> bool {
+        self.right != 0
+    }
+
+    pub(super) fn make_inner(&mut self, count: u32, right: u32) {
+        (self.count, self.right) = (count, right);
+    }
 }
 
 /// The slots of the left and of the right subtree below the root of `subtree`.
 pub(super) fn children(subtree: &[BinaryNode]) -> (&[BinaryNode], &[BinaryNode]) {
-    subtree[1..].split_at(2 * subtree[1].count as usize - 1)
+    subtree[1..].split_at(subtree[0].right as usize - 1)
+}
+
+/// How splits are searched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Few bins everywhere.
+    Coarse,
+    /// More bins where there are many references.
+    Fine,
 }
 
 /// Builds the tree and brings the references into its order. Empty without references.
 pub(super) fn build(references: &mut [Reference]) -> Vec<BinaryNode> {
+    build_by(references, Search::Fine)
+}
+
+/// The same with a choice of the search.
+pub(super) fn build_by(references: &mut [Reference], search: Search) -> Vec<BinaryNode> {
     let slots = (2 * references.len()).saturating_sub(1);
-    let mut nodes = vec![BinaryNode { bounds: Aabb::EMPTY, first: 0, count: 0 }; slots];
+    let mut nodes = bytemuck::zeroed_vec(slots);
     if !nodes.is_empty() {
         let summary = Summary::of(references);
-        subdivide(&mut nodes, references, 0, &summary, 0);
+        // From this count on there are many references.
+        let many = if search == Search::Fine { MANY } else { usize::MAX };
+        subdivide(&mut nodes, references, 0, &summary, (0, many));
     }
     nodes
 }
 
+/// Builds a subtree; returns how many of its slots lie before the end of the last one in use.
 fn subdivide(
     nodes: &mut [BinaryNode],
     references: &mut [Reference],
     first: usize,
     summary: &Summary,
-    depth: usize,
-) {
+    (depth, many): (usize, usize),
+) -> usize {
     let count = references.len();
     let Extent { min, max } = summary.boxes;
-    nodes[0] = BinaryNode {
-        bounds: Aabb { min: min.truncate(), max: max.truncate() },
-        first: first as u32,
-        count: count as u32,
-    };
+    let bounds = Aabb { min: min.truncate(), max: max.truncate() };
+    nodes[0] = BinaryNode::leaf(bounds, first as u32, count as u32);
     if count <= LEAF {
-        return;
+        return 1;
     }
-    let split = if depth < DEEPEST_SAH { best_split(references, summary) } else { None };
+    let split = match count {
+        _ if depth >= DEEPEST_SAH => None,
+        _ if count >= many => best_split::<MANY_BINS>(references, summary),
+        _ => best_split::<FEW_BINS>(references, summary),
+    };
     let (middle, left_summary, right_summary) = if let Some(split) = split {
         split.apply(references)
     } else {
@@ -155,15 +201,20 @@ fn subdivide(
         (left.len(), Summary::of(left), Summary::of(right))
     };
     let (left, right) = references.split_at_mut(middle);
-    let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * middle - 1);
-    let mut go_left = || subdivide(left_nodes, left, first, &left_summary, depth + 1);
-    let mut go_right = || subdivide(right_nodes, right, first + middle, &right_summary, depth + 1);
+    let (middle, below) = (first + middle, (depth + 1, many));
     if count >= PARALLEL {
-        rayon::join(go_left, go_right);
-    } else {
-        go_left();
-        go_right();
+        let (left_nodes, right_nodes) = nodes[1..].split_at_mut(2 * left.len() - 1);
+        let place = 1 + left_nodes.len();
+        let (_, used) = rayon::join(
+            || subdivide(left_nodes, left, first, &left_summary, below),
+            || subdivide(right_nodes, right, middle, &right_summary, below),
+        );
+        nodes[0].right = place as u32;
+        return place + used;
     }
+    let place = 1 + subdivide(&mut nodes[1..], left, first, &left_summary, below);
+    nodes[0].right = place as u32;
+    place + subdivide(&mut nodes[place..], right, middle, &right_summary, below)
 }
 
 /// How centres map to bins.
@@ -184,7 +235,7 @@ impl Binning {
     /// The bins of a reference along the axes: the nearest of `bins` points from the first to the
     /// last centre.
     #[inline]
-    fn bins(&self, reference: &Reference) -> [usize; 4] {
+    fn bins<const BINS: usize>(&self, reference: &Reference) -> [usize; 4] {
         // Numbers from 2²³ on have a unit in the last place of 1: the sum is rounded to an integer,
         // which then stands in the lowest bits.
         let shifted = (reference.center() - self.origin) * self.per_length + 8_388_608.0;
@@ -198,16 +249,28 @@ struct Split {
     binning: Binning,
     axis: usize,
     first_right: usize,
+    many: bool,
 }
 
 impl Split {
     /// Moves what lies left of the plane to the front; returns how many, and what lies on both sides.
     fn apply(&self, references: &mut [Reference]) -> (usize, Summary, Summary) {
+        if self.many {
+            self.apply_by::<MANY_BINS>(references)
+        } else {
+            self.apply_by::<FEW_BINS>(references)
+        }
+    }
+
+    fn apply_by<const BINS: usize>(
+        &self,
+        references: &mut [Reference],
+    ) -> (usize, Summary, Summary) {
         let (mut left, mut right) = (Summary::EMPTY, Summary::EMPTY);
         let (mut begin, mut end) = (0, references.len());
         while begin < end {
             let reference = references[begin];
-            if self.binning.bins(&reference)[self.axis] < self.first_right {
+            if self.binning.bins::<BINS>(&reference)[self.axis] < self.first_right {
                 left.add(&reference);
                 begin += 1;
             } else {
@@ -221,14 +284,12 @@ impl Split {
 }
 
 /// The best split by the surface area heuristic; `None` when all centres share their bins.
-fn best_split(references: &[Reference], summary: &Summary) -> Option<Split> {
-    // Few references do not need many places to split at.
-    let bins = BINS.min(8 + references.len() / 16);
-    let binning = Binning::new(&summary.centers, bins);
+fn best_split<const BINS: usize>(references: &[Reference], summary: &Summary) -> Option<Split> {
+    let binning = Binning::new(&summary.centers, BINS);
     let mut extents = [[Extent::EMPTY; BINS]; 3];
     let mut counts = [[0_u32; BINS]; 3];
     for reference in references {
-        let bin = binning.bins(reference);
+        let bin = binning.bins::<BINS>(reference);
         for axis in 0..3 {
             extents[axis][bin[axis]].add(reference.min, reference.max);
             counts[axis][bin[axis]] += 1;
@@ -241,13 +302,13 @@ fn best_split(references: &[Reference], summary: &Summary) -> Option<Split> {
         // Area times count of everything to the right of each plane, then the same from the left.
         let mut right_cost = [0.0_f32; BINS];
         let (mut sum, mut count) = (Extent::EMPTY, 0);
-        for k in (1..bins).rev() {
+        for k in (1..BINS).rev() {
             sum.add(extents[k].min, extents[k].max);
             count += counts[k];
             right_cost[k] = sum.half_area() * count as f32;
         }
         let (mut sum, mut count) = (Extent::EMPTY, 0);
-        for k in 1..bins {
+        for k in 1..BINS {
             sum.add(extents[k - 1].min, extents[k - 1].max);
             count += counts[k - 1];
             if count == 0 || count == total {
@@ -256,7 +317,8 @@ fn best_split(references: &[Reference], summary: &Summary) -> Option<Split> {
             let cost = sum.half_area() * count as f32 + right_cost[k];
             // Areas which overflow compare as equal: the first plane is as good as any.
             if cost < best.0 || best.1.is_none() {
-                best = (cost, Some(Split { binning, axis, first_right: k }));
+                best =
+                    (cost, Some(Split { binning, axis, first_right: k, many: BINS == MANY_BINS }));
             }
         }
     }

@@ -9,7 +9,10 @@
 use super::WideTree;
 use super::binary::{BinaryNode, LEAF, PARALLEL, Reference, children};
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
-use crate::description::TriangleMesh;
+use super::pages::filled_on_large_pages;
+use bytemuck::Zeroable;
+use glam::Vec3;
+use rayon::prelude::*;
 
 /// Cost of the box test of a node; the unit of costs.
 const NODE_COST: f32 = 1.0;
@@ -22,7 +25,8 @@ const WIDE_LEAF: usize = 2 * BLOCK;
 ///
 /// For `j` in `2..=7`: how many of `j` children the left subtree gets, or 0 if `j − 1` are as good.
 /// For 8: the same for a wide node with this root. For 1: whether that child is a leaf.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Zeroable)]
+#[repr(transparent)]
 struct Plan(u32);
 
 impl Plan {
@@ -115,71 +119,164 @@ impl<'a> Slots<'a> {
     }
 }
 
-struct Emitter<'a> {
-    mesh: &'a TriangleMesh,
-    references: &'a [Reference],
-    tree: WideTree,
+/// How many nodes and blocks a wide subtree takes, and where that of its children is worth knowing.
+#[derive(Clone, Debug, Default)]
+struct Size {
+    nodes: usize,
+    blocks: usize,
+    /// Room on the stack that a traversal takes.
+    stack: usize,
+    /// The sizes of the children that are nodes, in order; empty in a small subtree.
+    children: Vec<Size>,
 }
 
-impl Emitter<'_> {
+/// The slots of the wide node with this root, the largest box last: what blocks a shadow ray most
+/// likely is taken from the stack first (Nah and Manocha 2014, "SATO: Surface Area Traversal Order for
+/// Shadow Ray Tracing", Computer Graphics Forum 33(6), with boxes for surfaces).
+fn slots_of<'a>(nodes: &'a [BinaryNode], plans: &'a [Plan]) -> Slots<'a> {
+    let mut slots = Slots::default();
+    slots.divide(nodes, plans, WIDTH);
+    let area = |slot: &Option<(&[BinaryNode], &[Plan])>| {
+        slot.map_or(f32::INFINITY, |(nodes, _)| nodes[0].bounds.area())
+    };
+    slots.list[..slots.count].sort_by(|a, b| area(a).total_cmp(&area(b)));
+    slots
+}
+
+/// Measures the wide subtree with this root.
+fn size_of_subtree(nodes: &[BinaryNode], plans: &[Plan]) -> Size {
+    let slots = slots_of(nodes, plans);
+    let count = nodes[0].count as usize;
+    let mut size = Size { nodes: 1, ..Size::default() };
+    let mut inner = Vec::new();
+    for &(nodes, plans) in slots.list.iter().flatten() {
+        if plans[0].get(1) == 1 {
+            size.blocks += (nodes[0].count as usize).div_ceil(BLOCK);
+        } else {
+            inner.push((nodes, plans));
+        }
+    }
+    let below: Vec<Size> = if count >= PARALLEL {
+        inner.par_iter().map(|(nodes, plans)| size_of_subtree(nodes, plans)).collect()
+    } else {
+        inner.iter().map(|(nodes, plans)| size_of_subtree(nodes, plans)).collect()
+    };
+    for child in &below {
+        size.nodes += child.nodes;
+        size.blocks += child.blocks;
+        size.stack = size.stack.max(child.stack);
+    }
+    // All children are put on the stack before one is taken from it.
+    size.stack = slots.count.max(slots.count - 1 + size.stack);
+    if count >= PARALLEL {
+        size.children = below;
+    }
+    size
+}
+
+/// Writes a part of the tree: its own nodes and blocks, which start at these indices of the whole.
+struct Emitter<'a, C> {
+    /// The corners of a triangle.
+    corners: &'a C,
+    /// Triangles of all references, in the order of the binary tree.
+    order: &'a [u32],
+    nodes: &'a mut [Node],
+    blocks: &'a mut [Block],
+    first_node: usize,
+    first_block: usize,
+}
+
+impl<'a, C: Fn(u32) -> [Vec3; 3] + Sync> Emitter<'a, C> {
+    /// Takes so many nodes and blocks from the front for another emitter.
+    fn take(&mut self, nodes: usize, blocks: usize) -> Emitter<'a, C> {
+        let taken = Emitter {
+            nodes: self.nodes.split_off_mut(..nodes).expect("the size was measured"),
+            blocks: self.blocks.split_off_mut(..blocks).expect("the size was measured"),
+            ..*self
+        };
+        self.first_node += nodes;
+        self.first_block += blocks;
+        taken
+    }
+
     /// Writes the blocks of a leaf.
     fn leaf(&mut self, node: &BinaryNode) -> Child {
-        let first = self.tree.blocks.len();
-        let range = node.first as usize..(node.first + node.count) as usize;
-        for four in self.references[range].chunks(BLOCK) {
-            let mut block = Block::EMPTY;
-            for (lane, reference) in four.iter().enumerate() {
-                let triangle = reference.triangle();
-                block.set(lane, triangle, super::corners(self.mesh, triangle));
+        let order = &self.order[node.first as usize..(node.first + node.count) as usize];
+        let count = order.len().div_ceil(BLOCK);
+        let taken = self.take(0, count);
+        for (block, four) in taken.blocks.iter_mut().zip(order.chunks(BLOCK)) {
+            for (lane, &triangle) in four.iter().enumerate() {
+                block.set(lane, triangle, (self.corners)(triangle));
             }
-            self.tree.blocks.push(block);
         }
-        Child::leaf(first, self.tree.blocks.len() - first)
+        Child::leaf(taken.first_block, count)
     }
 
-    /// Writes a node and all below it; returns the room on the stack that its traversal takes.
-    fn node(&mut self, nodes: &[BinaryNode], plans: &[Plan]) -> usize {
-        let index = self.tree.nodes.len();
-        self.tree.nodes.push(Node::EMPTY);
-        let mut slots = Slots::default();
-        slots.divide(nodes, plans, WIDTH);
+    /// Writes a node and all below it. `sizes` are those of its children, where they are known.
+    fn node(&mut self, nodes: &[BinaryNode], plans: &[Plan], sizes: &[Size]) {
+        let own = &mut self.take(1, 0).nodes[0];
+        let slots = slots_of(nodes, plans);
         // First all leaves, so that those of a node are neighbours; then what is below.
         for (slot, (nodes, plans)) in slots.list.iter().flatten().enumerate() {
-            self.tree.nodes[index].set_box(slot, &nodes[0].bounds);
+            own.set_box(slot, &nodes[0].bounds);
             if plans[0].get(1) == 1 {
-                self.tree.nodes[index].children[slot] = self.leaf(&nodes[0]);
+                own.children[slot] = self.leaf(&nodes[0]);
             }
         }
-        let mut deepest = 0;
-        for (slot, (nodes, plans)) in slots.list.iter().flatten().enumerate() {
+        let mut later = Vec::with_capacity(sizes.len());
+        for (slot, &(nodes, plans)) in slots.list.iter().flatten().enumerate() {
             if plans[0].get(1) == 0 {
-                self.tree.nodes[index].children[slot] = Child::node(self.tree.nodes.len());
-                deepest = deepest.max(self.node(nodes, plans));
+                own.children[slot] = Child::node(self.first_node);
+                if let Some(size) = sizes.get(later.len()) {
+                    later.push((self.take(size.nodes, size.blocks), nodes, plans, size));
+                } else {
+                    self.node(nodes, plans, &[]);
+                }
             }
         }
-        // All children are put on the stack before one is taken from it.
-        slots.count.max(slots.count - 1 + deepest)
+        later.par_iter_mut().for_each(|(part, nodes, plans, size)| {
+            part.node(nodes, plans, &size.children);
+        });
     }
 }
 
-/// Makes the wide tree of a binary one.
-pub(super) fn collapse(
-    mesh: &TriangleMesh,
-    references: &[Reference],
+/// Makes the wide tree of a binary one; `corners` gives those of a triangle.
+pub(super) fn collapse<C: Fn(u32) -> [Vec3; 3] + Sync>(
+    corners: &C,
+    references: Vec<Reference>,
     nodes: &[BinaryNode],
 ) -> WideTree {
-    let mut emitter = Emitter { mesh, references, tree: WideTree::default() };
-    let Some(root) = nodes.first() else { return emitter.tree };
-    let mut plans = vec![Plan::default(); nodes.len()];
+    let Some(root) = nodes.first() else { return WideTree::default() };
+    // The boxes of the references are not needed any more: the memory goes to the tree.
+    let order: Vec<u32> = references.par_iter().map(Reference::triangle).collect();
+    drop(references);
+    let mut plans: Vec<Plan> = bytemuck::zeroed_vec(nodes.len());
     plan(nodes, &mut plans);
-    emitter.tree.blocks.reserve(references.len() / 3);
-    if root.count as usize <= WIDE_LEAF {
-        emitter.tree.root = emitter.leaf(root);
+    let is_leaf = root.count as usize <= WIDE_LEAF;
+    let size = if is_leaf {
+        Size { blocks: (root.count as usize).div_ceil(BLOCK), ..Size::default() }
     } else {
-        emitter.tree.root = Child::node(0);
-        emitter.tree.stack = emitter.node(nodes, &plans);
+        size_of_subtree(nodes, &plans)
+    };
+    let mut tree = WideTree {
+        nodes: filled_on_large_pages(size.nodes, Node::EMPTY),
+        blocks: filled_on_large_pages(size.blocks, Block::EMPTY),
+        root: Child::node(0),
+        stack: size.stack,
+    };
+    let (nodes_out, blocks_out) = (&mut tree.nodes[..], &mut tree.blocks[..]);
+    let mut all = Emitter {
+        corners,
+        order: &order,
+        nodes: nodes_out,
+        blocks: blocks_out,
+        first_node: 0,
+        first_block: 0,
+    };
+    if is_leaf {
+        tree.root = all.leaf(root);
+    } else {
+        all.node(nodes, &plans, &size.children);
     }
-    emitter.tree.nodes.shrink_to_fit();
-    emitter.tree.blocks.shrink_to_fit();
-    emitter.tree
+    tree
 }

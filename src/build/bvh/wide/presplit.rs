@@ -14,6 +14,7 @@
 
 use super::binary::{Reference, bounds_of};
 use super::corners;
+use super::pages::vec_on_large_pages;
 use crate::description::TriangleMesh;
 use crate::math::Aabb;
 use glam::{DVec3, Vec3};
@@ -30,29 +31,40 @@ const LEVELS: u32 = 24;
 pub(super) fn references(mesh: &TriangleMesh, budget: f32) -> Vec<Reference> {
     let count = mesh.triangles.len() as u32;
     let extra = (f64::from(count) * f64::from(budget)) as u64;
-    let whole = |triangle: u32| bounds_of(corners(mesh, triangle));
+    let mut list = vec_on_large_pages(count as usize + extra as usize);
+    let whole = |triangle: u32| bounds_of(corners(mesh, triangle)).unwrap_or(Aabb::EMPTY);
     if extra == 0 {
-        return (0..count)
-            .into_par_iter()
-            .filter_map(|triangle| Some(Reference::new(&whole(triangle)?, triangle)))
-            .collect();
-    }
-    let priorities: Vec<f32> =
-        (0..count).into_par_iter().map(|triangle| priority(corners(mesh, triangle))).collect();
-    let per_priority = fit(&priorities, extra);
-    let scene = mesh.positions.iter().filter(|p| p.is_finite()).copied();
-    let scene = Aabb::from_points(scene);
-    (0..count)
-        .into_par_iter()
-        .flat_map_iter(|triangle| {
+        let reference = |triangle| Reference::new(&whole(triangle), triangle);
+        list.par_extend((0..count).into_par_iter().map(reference));
+    } else {
+        let priorities: Vec<f32> =
+            (0..count).into_par_iter().map(|triangle| priority(corners(mesh, triangle))).collect();
+        let per_priority = fit(&priorities, extra);
+        let scene = mesh.positions.iter().filter(|p| p.is_finite()).copied();
+        let scene = Aabb::from_points(scene);
+        let cuts = |triangle: u32| share(priorities[triangle as usize], per_priority);
+        let parts = |triangle: u32| {
             let mut parts = Vec::new();
-            if let Some(bounds) = whole(triangle) {
-                let cuts = share(priorities[triangle as usize], per_priority);
-                cut(corners(mesh, triangle), bounds, cuts, &scene, &mut parts);
-            }
-            parts.into_iter().map(move |part| Reference::new(&part, triangle))
-        })
-        .collect()
+            cut(corners(mesh, triangle), whole(triangle), cuts(triangle), &scene, &mut parts);
+            parts
+        };
+        // First one part of each triangle, which is all of most, to its place in the list; then the
+        // others, for which the few cut triangles are cut again.
+        let first = |triangle| {
+            let part = if cuts(triangle) == 0 { whole(triangle) } else { parts(triangle)[0] };
+            Reference::new(&part, triangle)
+        };
+        list.par_extend((0..count).into_par_iter().map(first));
+        let others = |triangle| {
+            parts(triangle).into_iter().skip(1).map(move |part| Reference::new(&part, triangle))
+        };
+        let is_cut = |&triangle: &u32| cuts(triangle) > 0;
+        list.par_extend((0..count).into_par_iter().filter(is_cut).flat_map_iter(others));
+    }
+    if !mesh.positions.iter().all(|p| p.is_finite()) {
+        list.retain(|reference| !reference.is_empty());
+    }
+    list
 }
 
 /// How much a triangle gains by being cut; 0 where that is not a number.

@@ -2,7 +2,6 @@
 
 use crate::math::Aabb;
 use crate::shape::LocalRay;
-use glam::{DVec3, Vec3};
 
 /// Half the distance from 1 to the next `f32`: the relative error of one rounding.
 const UNIT: f64 = f32::EPSILON as f64 * 0.5;
@@ -56,15 +55,14 @@ impl BoxRay {
             near_planes: [0; 3],
             scale: f64::from_bits((exponent + 1) << 52),
         };
-        let (below, above) = around(ray.o);
         for axis in 0..3 {
-            let backward = ray.d[axis].is_sign_negative();
-            let i = -inverse[axis];
-            this.near_planes[axis] = 2 * axis + usize::from(backward);
+            let (o, d, i) = (ray.o[axis], ray.d[axis], -inverse[axis]);
+            this.near_planes[axis] = 2 * axis + usize::from(d.is_sign_negative());
             this.near_inverse[axis] = ((i * (1.0 - 4.0 * UNIT)) as f32).clamp(f32::MIN, f32::MAX);
             this.far_inverse[axis] = (i * (1.0 + 4.0 * UNIT)) as f32;
-            (this.near_origin[axis], this.far_origin[axis]) =
-                if backward { (below[axis], above[axis]) } else { (above[axis], below[axis]) };
+            let aside = rounding_of(o).copysign(d);
+            this.near_origin[axis] = ((o + aside) as f32).clamp(f32::MIN, f32::MAX);
+            this.far_origin[axis] = ((o - aside) as f32).clamp(f32::MIN, f32::MAX);
         }
         Some(this)
     }
@@ -84,8 +82,7 @@ impl BoxRay {
     /// out by this test. It rounds like that of the nodes, every step of which is monotonic: a ray
     /// that passes here passes the boxes of all nodes above as well, so that the tree never decides.
     #[inline(always)]
-    pub(super) fn reaches(&self, corners: [Vec3; 3], t: f64) -> bool {
-        let bounds = Aabb::from_points(corners);
+    pub(super) fn reaches(&self, bounds: &Aabb, t: f64) -> bool {
         let planes = [bounds.min, bounds.max];
         let (mut near, mut far) = (0.0, self.distance(t));
         for (axis, plane) in self.near_planes.into_iter().enumerate() {
@@ -99,19 +96,9 @@ impl BoxRay {
     }
 }
 
-/// The nearest `f32` on both sides of each component.
+/// So much from `o` any `f32` lies on that side of it after rounding: half a unit in the last place, that
+/// of `f64` included, or half the least number.
 #[inline(always)]
-fn around(o: DVec3) -> ([f32; 3], [f32; 3]) {
-    let rounded = o.as_vec3().to_array();
-    let exact = o.to_array();
-    let (mut below, mut above) = (rounded, rounded);
-    for axis in 0..3 {
-        let back = f64::from(rounded[axis]);
-        if back > exact[axis] {
-            below[axis] = rounded[axis].next_down();
-        } else if back < exact[axis] {
-            above[axis] = rounded[axis].next_up();
-        }
-    }
-    (below, above)
+fn rounding_of(o: f64) -> f64 {
+    o.abs() * (UNIT + UNIT * UNIT) + f64::from(f32::from_bits(1))
 }

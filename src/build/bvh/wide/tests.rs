@@ -24,7 +24,7 @@ fn nearest_of_all(mesh: &TriangleMesh, ray: &LocalRay, t_max: f64) -> Option<Tri
         let end = best.map_or(t_max, |best| best.t);
         let corners = corners(mesh, triangle);
         if let Some((t, weights)) = test.intersect(corners, end)
-            && boxes.reaches(corners, t)
+            && boxes.reaches(&Aabb::from_points(corners), t)
         {
             best = Some(TriangleHit { t, triangle, weights });
         }
@@ -47,7 +47,7 @@ fn nearest_by_binary_tree(
         match test.intersect(corners, end) {
             Some((t, weights))
                 if best.is_none_or(|best| (t, triangle) < (best.t, best.triangle))
-                    && boxes.reaches(corners, t) =>
+                    && boxes.reaches(&Aabb::from_points(corners), t) =>
             {
                 best = Some(TriangleHit { t, triangle, weights });
                 t.next_up()
@@ -93,7 +93,7 @@ fn ray(mesh: &TriangleMesh, bounds: &Aabb, number: u64) -> (LocalRay, f64) {
     (LocalRay { o, d: d * stretch }, end)
 }
 
-fn all_instructions() -> Vec<Instructions> {
+pub(super) fn all_instructions() -> Vec<Instructions> {
     let best = Instructions::detect();
     if matches!(best, Instructions::Portable) {
         vec![best]
@@ -157,7 +157,8 @@ fn hits_are_those_of_every_triangle() {
         ("room", RawMesh::room(8, 1, 2)),
     ] {
         let mesh = mesh_of(raw);
-        let tree = WideTree::build(&mesh, SPLITS);
+        let quality = BvhQuality::ALL[what.len() % 3];
+        let tree = WideTree::build_with_budget(&mesh, quality, SPLITS);
         let hits = compare(what, &mesh, &tree, RAYS, |ray, end| nearest_of_all(&mesh, ray, end));
         total += hits;
         assert!(hits > 0 || what == "a line", "{what}: no ray hits");
@@ -175,7 +176,7 @@ fn hits_are_those_of_a_binary_tree() {
         [("hills", RawMesh::terrain(60, 12, 8)), ("room", RawMesh::room(200, 10, 12))]
     {
         let mesh = mesh_of(raw);
-        let tree = WideTree::build(&mesh, SPLITS);
+        let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
         // Enlarged, so that the rounding of the distance of a hit cannot hide one of two equal hits.
         let boxes: Vec<Aabb> = (0..mesh.triangles.len() as u32)
             .map(|k| Aabb::from_points(corners(&mesh, k)).inflated(1e-6))
@@ -192,7 +193,7 @@ fn hits_are_those_of_a_binary_tree() {
 #[test]
 fn no_ray_leaves_a_closed_surface() {
     let mesh = mesh_of(RawMesh::icosphere(4).map(|p| p * 3.7 + Vec3::new(11.3, -0.7, 5.1)));
-    let tree = WideTree::build(&mesh, SPLITS);
+    let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
     let center = DVec3::new(11.3, -0.7, 5.1);
     (0..10 * RAYS).into_par_iter().for_each(|number| {
         let mut u = Uniforms(number);
@@ -219,7 +220,7 @@ fn any_number_of_threads_builds_the_same_tree() {
     let mesh = mesh_of(RawMesh::terrain(100, 20, 8));
     let build = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        pool.install(|| WideTree::build(&mesh, SPLITS))
+        pool.install(|| WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS))
     };
     let one = build(1);
     assert!(one.nodes.len() > 1000);
@@ -231,10 +232,10 @@ fn any_number_of_threads_builds_the_same_tree() {
 fn memory_is_as_forecast() {
     for raw in [RawMesh::terrain(60, 12, 8), RawMesh::room(200, 10, 12), RawMesh::icosphere(5)] {
         let mesh = mesh_of(raw);
-        for budget in [0.0, 0.1, 0.5] {
-            let held = WideTree::build(&mesh, budget).memory() as f64;
-            let forecast = WideTree::forecast(mesh.triangles.len(), budget) as f64;
-            assert!((held / forecast - 1.0).abs() < 0.2, "{held} for {forecast} at {budget}");
+        for quality in BvhQuality::ALL {
+            let held = WideTree::build(&mesh, quality).memory() as f64;
+            let forecast = WideTree::forecast(mesh.triangles.len(), quality) as f64;
+            assert!((held / forecast - 1.0).abs() < 0.2, "{held} for {forecast} at {quality:?}");
         }
     }
 }
@@ -277,7 +278,7 @@ fn degenerate_input_makes_bounded_trees() {
     for (raw, left_out) in [(RawMesh::default(), 0), (point, 0), (line, 0), (broken, 2), (huge, 0)]
     {
         let mesh = mesh_of(raw);
-        let tree = WideTree::build(&mesh, SPLITS);
+        let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
         assert!(tree.stack <= LONG_STACK);
         let mut found: Vec<u32> = tree
             .blocks
@@ -299,7 +300,7 @@ fn degenerate_input_makes_bounded_trees() {
 #[test]
 fn rays_which_are_not_rays_hit_nothing() {
     let mesh = mesh_of(RawMesh::soup(100, 0.5, 1));
-    let tree = WideTree::build(&mesh, SPLITS);
+    let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
     let bad = [DVec3::ZERO, DVec3::NAN, DVec3::INFINITY];
     let rays = bad.map(|d| LocalRay { o: DVec3::splat(0.5), d });
     let more = [DVec3::NAN, DVec3::INFINITY].map(|o| LocalRay { o, d: DVec3::X });
@@ -320,7 +321,7 @@ fn the_first_of_equal_triangles_is_hit() {
         raw.add(&one);
     }
     let mesh = mesh_of(raw);
-    let tree = WideTree::build(&mesh, SPLITS);
+    let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
     let center = one.positions.iter().sum::<Vec3>().as_dvec3() / 3.0;
     for d in [DVec3::new(0.3, 0.4, 0.5), DVec3::new(-0.3, -0.4, -0.5)] {
         let ray = LocalRay { o: center - d, d };
@@ -336,10 +337,28 @@ fn a_refitted_tree_finds_the_moved_triangles() {
     let twist = |p: Vec3| Quat::from_rotation_y(3.0 * p.y) * p + Vec3::new(5.0, 0.0, p.x);
     for count in [1, 5, 300] {
         let mesh = mesh_of(RawMesh::soup(count, 0.3, 1));
-        let mut tree = WideTree::build(&mesh, SPLITS);
+        let mut tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
         let moved = mesh_of(RawMesh::soup(count, 0.3, 1).map(twist));
         tree.refit(&moved);
         assert_eq!(tree.bounds(), Aabb::from_points(moved.positions.iter().copied()));
         compare("moved", &moved, &tree, RAYS / 2, |ray, end| nearest_of_all(&moved, ray, end));
     }
+}
+
+/// The expected cost of a ray: the areas of all boxes of the nodes.
+fn cost(tree: &WideTree) -> f64 {
+    let boxes = tree.nodes.iter().flat_map(|node| (0..WIDTH).map(|slot| node.get_box(slot)));
+    boxes.filter(|bounds| !bounds.is_empty()).map(|bounds| f64::from(bounds.area())).sum()
+}
+
+/// Oracle: brute force for every quality, and the cost that each of them is paid to lower.
+#[test]
+fn better_trees_find_the_same_for_less() {
+    let mesh = mesh_of(RawMesh::room(100, 3, 3));
+    let trees = BvhQuality::ALL.map(|quality| WideTree::build(&mesh, quality));
+    for tree in &trees {
+        compare("room", &mesh, tree, RAYS / 4, |ray, end| nearest_of_all(&mesh, ray, end));
+    }
+    let [fast, balanced, best] = [&trees[0], &trees[1], &trees[2]].map(cost);
+    assert!(best < 0.97 * balanced && balanced < fast, "{best}, {balanced}, {fast}");
 }

@@ -8,11 +8,11 @@
 //! ([`BoxRay::reaches`]). So the answer is that of testing every triangle by itself, bit for bit,
 //! whatever the tree looks like and whichever set of instructions ran.
 
-use super::WideTree;
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
 use super::ray::BoxRay;
+use crate::math::Aabb;
 use crate::shape::{LocalRay, TriangleTest};
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3};
 
 /// Where a ray meets a triangle of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +39,41 @@ pub(super) struct BlockHits {
 #[repr(align(32))]
 pub(super) struct Distances(pub(super) [f32; WIDTH]);
 
+/// Corners of the four triangles of a block in `f64`, by corner, axis and lane.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(32))]
+pub(super) struct WideCorners(pub(super) [[[f64; BLOCK]; 3]; 3]);
+
+/// What is traversed: nodes and blocks as they are at the time of the ray.
+///
+/// A tree at rest has them in memory; one that moves makes them, and nothing of that is in the code
+/// for a tree at rest.
+pub(super) trait Nodes {
+    /// Where to begin.
+    fn root(&self) -> Child;
+
+    /// A node; `scratch` is there for one that must be made.
+    fn node<'a>(&'a self, index: usize, scratch: &'a mut Node) -> &'a Node;
+
+    /// Which triangles of a block the ray meets with `0 < t < t_max`, and where.
+    fn hit<L: Lanes>(
+        &self,
+        block: usize,
+        ray: &L::Triangles,
+        t_max: f64,
+        hits: &mut BlockHits,
+    ) -> u32;
+
+    /// Index of a triangle of a block.
+    fn triangle(&self, block: usize, lane: usize) -> u32;
+
+    /// The box of a triangle of a block, within those of all nodes above it.
+    fn triangle_bounds(&self, block: usize, lane: usize) -> Aabb;
+
+    /// Where a child lies, and how many lines of 64 bytes of it are read.
+    fn place(&self, child: Child) -> (*const i8, usize);
+}
+
 /// A test of eight boxes and one of four triangles, for one ray.
 ///
 /// Bit `k` of a returned mask stands for lane `k`.
@@ -57,8 +92,16 @@ pub(super) trait Lanes {
     /// Which triangles the ray meets with `0 < t < t_max`, and where.
     fn hit(ray: &Self::Triangles, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32;
 
-    /// Asks for the memory of a child ahead of time.
-    fn prefetch(tree: &WideTree, child: Child);
+    /// The same for corners in `f64`.
+    fn hit_wide(
+        ray: &Self::Triangles,
+        corners: &WideCorners,
+        t_max: f64,
+        hits: &mut BlockHits,
+    ) -> u32;
+
+    /// Asks for so many lines of memory ahead of time.
+    fn prefetch(place: (*const i8, usize));
 }
 
 /// The tests in plain Rust, for any processor.
@@ -111,31 +154,50 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn prefetch(_: &WideTree, _: Child) {}
+    fn hit_wide(
+        ray: &TriangleTest,
+        corners: &WideCorners,
+        t_max: f64,
+        hits: &mut BlockHits,
+    ) -> u32 {
+        let mut mask = 0;
+        for lane in 0..BLOCK {
+            let triangle = corners.0.map(|corner| DVec3::from_array(corner.map(|row| row[lane])));
+            if let Some((t, weights)) = ray.intersect_exact(triangle, t_max) {
+                hits.t[lane] = t;
+                (hits.second[lane], hits.third[lane]) = (weights.x, weights.y);
+                mask |= 1 << lane;
+            }
+        }
+        mask
+    }
+
+    #[inline(always)]
+    fn prefetch(_: (*const i8, usize)) {}
 }
 
 /// A child on the stack: its distance in the upper half, so that keys sort by distance (which is not
 /// negative, and the bits of such numbers are in their order).
-type Key = u64;
+pub(super) type Key = u64;
 
 #[inline(always)]
-fn key(distance: f32, child: Child) -> Key {
+pub(super) fn key(distance: f32, child: Child) -> Key {
     u64::from(distance.to_bits()) << 32 | u64::from(child.0)
 }
 
 #[inline(always)]
-fn child_of(key: Key) -> Child {
+pub(super) fn child_of(key: Key) -> Child {
     Child(key as u32)
 }
 
 #[inline(always)]
-fn distance_of(key: Key) -> f32 {
+pub(super) fn distance_of(key: Key) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 
 /// The lanes of a mask, from the lowest.
 #[inline(always)]
-fn take_lane(mask: &mut u32) -> usize {
+pub(super) fn take_lane(mask: &mut u32) -> usize {
     let lane = mask.trailing_zeros() as usize;
     *mask &= *mask - 1;
     lane % WIDTH
@@ -143,17 +205,17 @@ fn take_lane(mask: &mut u32) -> usize {
 
 /// [`BoxRay::reaches`], for a ray that was prepared already or is now.
 #[inline(always)]
-fn is_met(ray: &LocalRay, prepared: Option<&BoxRay>, corners: [Vec3; 3], t: f64) -> bool {
+fn is_met(ray: &LocalRay, prepared: Option<&BoxRay>, bounds: &Aabb, t: f64) -> bool {
     match prepared {
-        Some(prepared) => prepared.reaches(corners, t),
-        None => BoxRay::new(ray).is_some_and(|prepared| prepared.reaches(corners, t)),
+        Some(prepared) => prepared.reaches(bounds, t),
+        None => BoxRay::new(ray).is_some_and(|prepared| prepared.reaches(bounds, t)),
     }
 }
 
 /// Lowers `best` and `t_max` to the nearest hit in a leaf.
 #[inline(always)]
-fn nearest_of_leaf<L: Lanes>(
-    tree: &WideTree,
+fn nearest_of_leaf<L: Lanes, N: Nodes>(
+    tree: &N,
     leaf: Child,
     ray: &LocalRay,
     prepared: Option<&BoxRay>,
@@ -162,13 +224,13 @@ fn nearest_of_leaf<L: Lanes>(
     best: &mut Option<TriangleHit>,
 ) {
     let mut hits = BlockHits::default();
-    for block in &tree.blocks[leaf.blocks()] {
-        let mut mask = L::hit(triangles, block, *t_max, &mut hits);
+    for block in leaf.blocks() {
+        let mut mask = tree.hit::<L>(block, triangles, *t_max, &mut hits);
         while mask != 0 {
             let lane = take_lane(&mut mask) % BLOCK;
-            let (t, triangle) = (hits.t[lane], block.triangles[lane]);
+            let (t, triangle) = (hits.t[lane], tree.triangle(block, lane));
             if best.is_none_or(|best| (t, triangle) < (best.t, best.triangle))
-                && is_met(ray, prepared, block.get(lane), t)
+                && is_met(ray, prepared, &tree.triangle_bounds(block, lane), t)
             {
                 let weights = DVec2::new(hits.second[lane], hits.third[lane]);
                 *best = Some(TriangleHit { t, triangle, weights });
@@ -181,8 +243,8 @@ fn nearest_of_leaf<L: Lanes>(
 
 /// Whether any triangle of a leaf is hit.
 #[inline(always)]
-fn leaf_blocks<L: Lanes>(
-    tree: &WideTree,
+fn leaf_blocks<L: Lanes, N: Nodes>(
+    tree: &N,
     leaf: Child,
     ray: &LocalRay,
     prepared: Option<&BoxRay>,
@@ -190,11 +252,11 @@ fn leaf_blocks<L: Lanes>(
     t_max: f64,
 ) -> bool {
     let mut hits = BlockHits::default();
-    for block in &tree.blocks[leaf.blocks()] {
-        let mut mask = L::hit(triangles, block, t_max, &mut hits);
+    for block in leaf.blocks() {
+        let mut mask = tree.hit::<L>(block, triangles, t_max, &mut hits);
         while mask != 0 {
             let lane = take_lane(&mut mask) % BLOCK;
-            if is_met(ray, prepared, block.get(lane), hits.t[lane]) {
+            if is_met(ray, prepared, &tree.triangle_bounds(block, lane), hits.t[lane]) {
                 return true;
             }
         }
@@ -204,15 +266,15 @@ fn leaf_blocks<L: Lanes>(
 
 /// The child in the lowest lane of a mask, asked for ahead of time.
 #[inline(always)]
-fn take_child<L: Lanes>(
-    tree: &WideTree,
+fn take_child<L: Lanes, N: Nodes>(
+    tree: &N,
     node: &Node,
     distances: &Distances,
     mask: &mut u32,
 ) -> Key {
     let lane = take_lane(mask);
     let child = node.children[lane];
-    L::prefetch(tree, child);
+    L::prefetch(tree.place(child));
     key(distances.0[lane], child)
 }
 
@@ -220,15 +282,15 @@ fn take_child<L: Lanes>(
 ///
 /// `STACK` is at least what the tree needs.
 #[inline(always)]
-pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
-    tree: &WideTree,
+pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
+    tree: &N,
     ray: &LocalRay,
     mut t_max: f64,
 ) -> Option<TriangleHit> {
     let triangles = L::prepare_triangles(&TriangleTest::new(ray));
     let mut best = None;
-    if tree.root.is_leaf() {
-        nearest_of_leaf::<L>(tree, tree.root, ray, None, &triangles, &mut t_max, &mut best);
+    if tree.root().is_leaf() {
+        nearest_of_leaf::<L, N>(tree, tree.root(), ray, None, &triangles, &mut t_max, &mut best);
         return best;
     }
     let prepared = BoxRay::new(ray)?;
@@ -237,11 +299,12 @@ pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
     let mut stack = [0_u64; STACK];
     let mut depth = 0;
     let mut distances = Distances::default();
-    let mut current = tree.root;
+    let mut current = tree.root();
+    let mut scratch = Node::EMPTY;
     loop {
         if current.is_leaf() {
             let before = t_max;
-            nearest_of_leaf::<L>(
+            nearest_of_leaf::<L, N>(
                 tree,
                 current,
                 ray,
@@ -254,15 +317,15 @@ pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
                 end = prepared.distance(t_max);
             }
         } else {
-            let node = &tree.nodes[current.index()];
+            let node = tree.node(current.index(), &mut scratch);
             let mut mask = L::enter(&boxes, node, end, &mut distances);
             if mask != 0 {
-                let a = take_child::<L>(tree, node, &distances, &mut mask);
+                let a = take_child::<L, N>(tree, node, &distances, &mut mask);
                 if mask == 0 {
                     current = child_of(a);
                     continue;
                 }
-                let b = take_child::<L>(tree, node, &distances, &mut mask);
+                let b = take_child::<L, N>(tree, node, &distances, &mut mask);
                 let (a, b) = (a.min(b), a.max(b));
                 if mask == 0 {
                     stack[depth] = b;
@@ -270,7 +333,7 @@ pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
                     current = child_of(a);
                     continue;
                 }
-                let c = take_child::<L>(tree, node, &distances, &mut mask);
+                let c = take_child::<L, N>(tree, node, &distances, &mut mask);
                 let (a, c) = (a.min(c), a.max(c));
                 let (b, c) = (b.min(c), b.max(c));
                 if mask == 0 {
@@ -286,7 +349,7 @@ pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
                     depth += 1;
                 }
                 while mask != 0 {
-                    let key = take_child::<L>(tree, node, &distances, &mut mask);
+                    let key = take_child::<L, N>(tree, node, &distances, &mut mask);
                     let mut place = depth;
                     while place > bottom && stack[place - 1] < key {
                         stack[place] = stack[place - 1];
@@ -317,14 +380,14 @@ pub(super) fn closest_hit<L: Lanes, const STACK: usize>(
 ///
 /// `STACK` is at least what the tree needs.
 #[inline(always)]
-pub(super) fn any_hit<L: Lanes, const STACK: usize>(
-    tree: &WideTree,
+pub(super) fn any_hit<L: Lanes, N: Nodes, const STACK: usize>(
+    tree: &N,
     ray: &LocalRay,
     t_max: f64,
 ) -> bool {
     let triangles = L::prepare_triangles(&TriangleTest::new(ray));
-    if tree.root.is_leaf() {
-        return leaf_blocks::<L>(tree, tree.root, ray, None, &triangles, t_max);
+    if tree.root().is_leaf() {
+        return leaf_blocks::<L, N>(tree, tree.root(), ray, None, &triangles, t_max);
     }
     let Some(prepared) = BoxRay::new(ray) else { return false };
     let boxes = L::prepare_boxes(&prepared);
@@ -332,18 +395,19 @@ pub(super) fn any_hit<L: Lanes, const STACK: usize>(
     let mut stack = [Child::NOTHING; STACK];
     let mut depth = 0;
     let mut distances = Distances::default();
-    let mut current = tree.root;
+    let mut current = tree.root();
+    let mut scratch = Node::EMPTY;
     loop {
         if current.is_leaf() {
-            if leaf_blocks::<L>(tree, current, ray, Some(&prepared), &triangles, t_max) {
+            if leaf_blocks::<L, N>(tree, current, ray, Some(&prepared), &triangles, t_max) {
                 return true;
             }
         } else {
-            let node = &tree.nodes[current.index()];
+            let node = tree.node(current.index(), &mut scratch);
             let mut mask = L::enter(&boxes, node, end, &mut distances);
             while mask != 0 {
                 let child = node.children[take_lane(&mut mask)];
-                L::prefetch(tree, child);
+                L::prefetch(tree.place(child));
                 stack[depth] = child;
                 depth += 1;
             }

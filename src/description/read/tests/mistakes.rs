@@ -673,3 +673,27 @@ fn many_mistakes_of_one_file_are_told_together() {
     scene.ron:25:63: expected `true` or `false`, found `yes`
     "#);
 }
+
+#[test]
+fn mistakes_in_water_are_told_with_their_place() {
+    let water = |fields: &str| {
+        let text = with_part(&format!("meshes: {{\"sea\": Waves({fields})}}"));
+        with_settings(&text, &[]).map(|_| ()).expect_err("it is wrong").to_string()
+    };
+    insta::assert_snapshot!(water("size: (3, 0), cells: (0, 10), steepness: 1.5, gravity: -1, waves: []"), @r"
+    scene.ron:2:33: `size` must be at least 1e-12 and at most 1e15 metres, but is 0
+    scene.ron:2:45: `cells` must be at least 1 and at most 65536 cells, but is 0
+    scene.ron:2:64: `steepness` must be at least 0 and at most 1, but is 1.5
+    scene.ron:2:78: `gravity` must be greater than 0 and at most 1000000 metres per second squared, but is -1
+    scene.ron:2:89: `waves` needs 1 to 1024 waves, but has 0
+    ");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0, height: 1)]"), @"scene.ron:2:92: `0` has no field `height`");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0), (frequency: 1)]"), @"scene.ron:2:17: `wave` needs a field `amplitude`");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0)]"), @r"
+    scene.ron:2:74: `amplitude` must be at least 0 and at most 1e15 metres, but is -1
+    scene.ron:2:89: `frequency` must be greater than 0 and at most 1000000 periods per second, but is 0
+    ");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (65536, 65536), waves: [(amplitude: 1, frequency: 1)]"), @"scene.ron:2:44: a surface has at most 4194304 cells, but this has 4294967296");
+    // a·k = 0.5·(2π)²/9.81 = 2.01
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), steepness: 0.7, waves: [(amplitude: 0.5, frequency: 1)]"), @"scene.ron:2:77: the surface may fold over itself: `steepness` times the sum of amplitude times wave number is 1.409, and must be at most 1");
+}

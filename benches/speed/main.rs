@@ -1,0 +1,107 @@
+//! How fast the renderer is, in one table: rays, builds, samples, frames, and how they grow.
+//!
+//! `cargo bench --bench speed` runs everything but the convergence; after `--`:
+//!
+//! ```text
+//! --quick         smaller meshes, fewer repetitions
+//! --json FILE     the same numbers by the same names
+//! --only A,B      of rays, build, samples, frame, growth
+//! --convergence   CPU-seconds of whole renders to a relMSE of 1e-3, and their memory
+//! ```
+//!
+//! Speeds are per CPU-second, which a busy machine disturbs less; what is compared runs in turn, and
+//! medians are given. Ratios repeat to a few percent, absolute numbers less well.
+
+mod builds;
+mod clock;
+mod convergence;
+mod frames;
+mod growth;
+mod rays;
+mod report;
+mod samples;
+
+#[path = "../common/mod.rs"]
+mod common;
+#[expect(dead_code, reason = "shared with tests, which need more of it")]
+#[path = "../../src/build/bvh/wide/meshes.rs"]
+mod meshes;
+
+use kinora::description::TriangleMesh;
+use meshes::RawMesh;
+use report::Report;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What was asked for.
+#[derive(Default)]
+pub struct Options {
+    quick: bool,
+    json: Option<PathBuf>,
+    only: Option<Vec<String>>,
+    convergence: bool,
+}
+
+impl Options {
+    fn parse(words: impl Iterator<Item = String>) -> Result<Self, String> {
+        let mut options = Self::default();
+        let mut words = words;
+        while let Some(word) = words.next() {
+            let mut value = || words.next().ok_or(format!("{word} needs a value"));
+            match word.as_str() {
+                "--quick" => options.quick = true,
+                "--convergence" => options.convergence = true,
+                "--json" => options.json = Some(value()?.into()),
+                "--only" => options.only = Some(value()?.split(',').map(str::to_owned).collect()),
+                // Cargo says that this is a bench.
+                "--bench" => {}
+                _ => return Err(format!("unknown option {word}")),
+            }
+        }
+        Ok(options)
+    }
+
+    fn wants(&self, section: &str) -> bool {
+        match &self.only {
+            Some(only) => only.iter().any(|word| word == section),
+            None => !self.convergence,
+        }
+    }
+}
+
+fn mesh_of(raw: RawMesh) -> TriangleMesh {
+    TriangleMesh { positions: raw.positions, triangles: raw.triangles, ..Default::default() }
+}
+
+fn main() -> ExitCode {
+    let options = match Options::parse(std::env::args().skip(1)) {
+        Ok(options) => options,
+        Err(message) => {
+            eprintln!("{message}");
+            return ExitCode::from(2);
+        }
+    };
+    let mut report = Report::default();
+    let sections: [(&str, fn(&Options, &mut Report)); 5] = [
+        ("rays", rays::run),
+        ("build", builds::run),
+        ("samples", samples::run),
+        ("frame", frames::run),
+        ("growth", growth::run),
+    ];
+    for (name, run) in sections {
+        if options.wants(name) {
+            run(&options, &mut report);
+        }
+    }
+    if options.convergence {
+        convergence::run(&options, &mut report);
+    }
+    if let Some(path) = &options.json
+        && let Err(error) = report.write(path)
+    {
+        eprintln!("{}: {error}", path.display());
+        return ExitCode::FAILURE;
+    }
+    ExitCode::SUCCESS
+}

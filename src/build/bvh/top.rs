@@ -1,0 +1,158 @@
+//! The tree over the objects of a frame.
+
+use super::resting::RestingTree;
+use super::wide::BoxTree;
+use super::{Bvh, MeshTree};
+use crate::extract::{FrameOrigin, Instance, Instances, NOTHING};
+use crate::math::Aabb;
+use bevy_ecs::prelude::*;
+use glam::{DAffine3, DVec3};
+use std::sync::Arc;
+
+/// With so few objects each is asked in turn, which costs less than a tree over them.
+const FEW: usize = 3;
+/// Stands among the objects for all meshes of the [`RestingTree`].
+pub(super) const RESTING: u32 = u32::MAX;
+
+/// The resting meshes as the top level holds them.
+#[derive(Clone, Debug)]
+pub(super) struct Joined {
+    pub(super) tree: Arc<MeshTree>,
+    /// Render space from the space of the tree.
+    pub(super) shift: DVec3,
+    pub(super) members: RestingTree,
+}
+
+impl Joined {
+    fn new(resting: &RestingTree, origin: &FrameOrigin) -> Option<Self> {
+        let (tree, shift) = resting.placed(origin)?;
+        Some(Self { tree, shift, members: resting.clone() })
+    }
+
+    /// Sees the tree from another origin.
+    fn place(&mut self, origin: &FrameOrigin) {
+        if let Some((_, shift)) = self.members.placed(origin) {
+            self.shift = shift;
+        }
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.tree.bounds().transformed(&DAffine3::from_translation(self.shift))
+    }
+}
+
+/// The tree over the objects of a frame. Planes have no bounds and are kept beside it.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct TopLevel {
+    pub(super) tree: BoxTree,
+    /// What is asked without a tree.
+    pub(super) always: Vec<u32>,
+    pub(super) joined: Option<Joined>,
+    /// For each instance its box in the tree, or [`NOTHING`].
+    boxes: Vec<u32>,
+    bounds: Aabb,
+    /// Whether it was built anew in this frame.
+    pub built: bool,
+    /// How many objects were put elsewhere in this frame without building it anew.
+    pub refitted: usize,
+}
+
+impl TopLevel {
+    /// Builds the tree over `instances`.
+    pub fn build(instances: &[Instance]) -> Self {
+        Self::with_resting(instances, &RestingTree::default(), &FrameOrigin::default())
+    }
+
+    /// Builds the tree over `instances` and the tree of resting meshes.
+    pub fn with_resting(
+        instances: &[Instance],
+        resting: &RestingTree,
+        origin: &FrameOrigin,
+    ) -> Self {
+        let joined = Joined::new(resting, origin);
+        let mut objects: Vec<(u32, Aabb)> = Vec::with_capacity(instances.len() + 1);
+        let mut always = Vec::new();
+        let mut boxes = vec![NOTHING; instances.len()];
+        for (index, instance) in (0..).zip(instances) {
+            if resting.first_triangle(index).is_some() {
+                continue;
+            }
+            if instance.bounds.min.is_finite() {
+                boxes[index as usize] = objects.len() as u32;
+                objects.push((index, instance.bounds));
+            } else {
+                always.push(index);
+            }
+        }
+        if let Some(joined) = &joined {
+            objects.push((RESTING, joined.bounds()));
+        }
+        let bounds = objects.iter().fold(Aabb::EMPTY, |sum, (_, b)| sum.union(*b));
+        let tree = if objects.len() <= FEW {
+            // The resting meshes first: most of what is hit is there, and a near hit saves work.
+            always.extend(objects.iter().rev().map(|(index, _)| *index));
+            BoxTree::default()
+        } else {
+            let (names, boxes): (Vec<u32>, Vec<Aabb>) = objects.into_iter().unzip();
+            BoxTree::collapse(&Bvh::build(&boxes, 1), &boxes, &names)
+        };
+        Self { tree, always, joined, boxes, bounds, built: true, refitted: 0 }
+    }
+
+    /// Puts some objects elsewhere; false when the tree should rather be built anew.
+    fn refit(&mut self, instances: &[Instance], moved: &[u32], origin: &FrameOrigin) -> bool {
+        if self.tree.is_empty() {
+            // There is next to nothing to build.
+            return false;
+        }
+        for &index in moved {
+            let instance = &instances[index as usize];
+            let place = self.boxes[index as usize];
+            if instance.bounds.min.is_finite() != (place != NOTHING) {
+                return false;
+            }
+            if place != NOTHING {
+                self.tree.refit(place as usize, &instance.bounds);
+            }
+        }
+        if let Some(joined) = &mut self.joined {
+            joined.place(origin);
+            // Its box is the last.
+            self.tree.refit(self.tree.len() - 1, &joined.bounds());
+        }
+        self.bounds = self.tree.bounds();
+        self.refitted = moved.len();
+        !self.tree.is_worn()
+    }
+
+    /// The box around all instances which have bounds.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+}
+
+/// Follows the instances: those which moved are put elsewhere in the tree, and it is built anew when
+/// objects came or went, or when it was refitted so often that rays suffer.
+///
+/// What a ray hits does not depend on the shape of the tree, so that a frame is the same in either case.
+pub fn rebuild_top_level(
+    instances: Res<Instances>,
+    resting: Res<RestingTree>,
+    origin: Res<FrameOrigin>,
+    mut top: ResMut<TopLevel>,
+) {
+    let changed = instances.is_changed() || resting.is_changed() || origin.is_changed();
+    if !changed {
+        if top.built || top.refitted > 0 {
+            let top = top.bypass_change_detection();
+            (top.built, top.refitted) = (false, 0);
+        }
+        return;
+    }
+    let top = &mut *top;
+    let same = !(instances.is_added() || instances.restructured || resting.is_changed());
+    top.built = false;
+    if !(same && top.refit(&instances.list, &instances.rewritten_slots, &origin)) {
+        *top = TopLevel::with_resting(&instances.list, &resting, &origin);
+    }
+}
