@@ -3,10 +3,10 @@
 use crate::build::bvh::{MeshTrees, RestingTree, TopLevel};
 use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
-use crate::description::{IntegratorChoice, SceneDescription};
-use crate::extract::{Emissions, Instance, Instances, Requirements, Surfaces, ViewCamera};
+use crate::description::SceneDescription;
+use crate::extract::{ChosenIntegrator, Emissions, Instance, Instances, Surfaces, ViewCamera};
 use crate::film::{Film, FilmError};
-use crate::integrate::IntegrateStatus;
+use crate::integrate::{IntegrateStatus, PhotonReport};
 use crate::world::{Camera, FrameClock, Settings};
 use crate::{build, extract, integrate, step};
 use bevy_ecs::prelude::*;
@@ -70,6 +70,8 @@ pub struct FrameReport {
     pub non_finite: u64,
     /// Paths cut off at `max_depth`.
     pub truncated_paths: u64,
+    /// What the photons of the frame came to, if there were any.
+    pub photons: Option<PhotonReport>,
     /// Which integrator ran.
     pub integrator: String,
     /// Things the user should know.
@@ -281,8 +283,9 @@ impl Simulation {
             rays: status.counters.rays,
             non_finite: film.non_finite(),
             truncated_paths: status.counters.truncated,
+            photons: status.photons,
             integrator: self.integrator(),
-            warnings: self.warnings(),
+            warnings: self.warnings().into_iter().chain(status.warnings).collect(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
         Ok(RenderedFrame { film, report, world_to_camera })
@@ -375,15 +378,12 @@ impl Simulation {
 
     /// The integrator which the settings ask for, and for `Auto` why it is taken.
     pub fn integrator(&self) -> String {
-        match self.world.resource::<Settings>().0.integrator {
-            IntegratorChoice::Path => "Path".to_owned(),
-            IntegratorChoice::Auto => "Path (Auto takes it: the only integrator so far)".to_owned(),
-        }
+        self.world.resource::<ChosenIntegrator>().description()
     }
 
     /// What the user should know of the frame that was prepared or rendered last.
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = self.world.resource::<Requirements>().warnings.clone();
+        let mut warnings = self.world.resource::<ChosenIntegrator>().warnings.clone();
         warnings.extend(self.world.resource::<ViewCamera>().warning.clone());
         if self.world.resource::<LightTable>().is_empty() {
             warnings.push(

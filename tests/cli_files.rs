@@ -136,10 +136,10 @@ fn warnings_are_told_once_and_not_for_every_frame() {
     let suspicious = SCENE
         .replace(
             "entities:",
-            r#"materials: { "spare": Mirror(), "glass": Dielectric() }, entities:"#,
+            r#"render: (integrator: Path), materials: { "spare": Mirror(), "glass": Dielectric() }, entities:"#,
         )
         .replace("emission: Radiance((0.5, 0.25, 0.125))", r#"material: "glass""#)
-        .replace(r#""ball""#, r#""spot": (light: Point(power: (1, 1, 1))), "ball""#);
+        .replace(r#""ball""#, r#""spot": (light: Point(power: (1, 1, 1))), "floor": (shape: Plane()), "ball""#);
     fs::write(folder.path().join("b.ron"), suspicious).expect("writable");
     let small = ["render", "b.ron", "--size", "8x8", "--samples", "1", "--frames", "0-3"];
     let output = kinora(folder.path(), &small);

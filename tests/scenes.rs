@@ -143,7 +143,10 @@ fn the_scene_format_tells_the_true_defaults_of_clock_and_settings() {
     let format = fs::read_to_string(repository().join("docs/scene-format.md")).expect("readable");
     let clock = documented_defaults(&format, "Clock");
     let render = documented_defaults(&format, "Render");
+    let photons = documented_defaults(&format, "Photons");
+    assert!(photons.contains("nearest"), "{photons}");
     assert!(clock.contains("shutter") && render.contains("exr_bits"), "{clock}; {render}");
+    let render = render.replace("photons: ()", &format!("photons: ({photons})"));
     let scene = scene_with(&format!("clock: ({clock}), render: ({render}),"));
     assert_eq!(scene.clock, Clock::default(), "{clock}");
     assert_eq!(scene.render, RenderSettings::default(), "{render}");

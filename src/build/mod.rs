@@ -1,8 +1,9 @@
-//! Structures over the flat arrays: bounding volume hierarchies and the table of lights.
+//! Structures over the flat arrays: bounding volume hierarchies, the table of lights, photon maps.
 
 pub mod bvh;
 pub mod light;
 mod memory;
+pub mod photon;
 
 pub(crate) use memory::trees_fit;
 pub use memory::{TreeMemory, forecast_tree_memory};
@@ -16,6 +17,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(bvh::MeshTrees::default());
     world.insert_resource(bvh::TopLevel::default());
     world.insert_resource(light::LightTable::default());
+    world.insert_resource(light::PhotonSource::default());
     world.insert_resource(light::ShapeLights::default());
     world.insert_resource(TreeMemory::default());
     let trees = (
@@ -28,7 +30,14 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         light::rebuild_light_table,
         light::prepare_shape_lights,
         stamp("light table"),
+        light::rebuild_photon_source.run_if(photons_are_traced),
+        stamp("photon source"),
     );
     let trees = trees.chain().run_if(trees_fit);
     frame.add_systems((forecast_tree_memory, trees).chain().in_set(FrameSystems::Build));
+}
+
+/// Whether the integrator of this frame works with photons.
+fn photons_are_traced(integrator: Res<crate::extract::ChosenIntegrator>) -> bool {
+    integrator.method.has_photons()
 }

@@ -165,6 +165,11 @@ pub enum IntegratorName {
     Auto,
     /// Path tracing
     Path,
+    /// Photon mapping: photons first, then the picture
+    #[value(name = "photonmap", alias = "photon-map")]
+    PhotonMap,
+    /// Stochastic progressive photon mapping
+    Sppm,
 }
 
 impl From<IntegratorName> for IntegratorChoice {
@@ -172,6 +177,8 @@ impl From<IntegratorName> for IntegratorChoice {
         match name {
             IntegratorName::Auto => Self::Auto,
             IntegratorName::Path => Self::Path,
+            IntegratorName::PhotonMap => Self::PhotonMap,
+            IntegratorName::Sppm => Self::Sppm,
         }
     }
 }

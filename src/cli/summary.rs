@@ -1,6 +1,7 @@
 //! What a run came to, told at its end.
 
 use super::format;
+use kinora::integrate::PhotonReport;
 use kinora::output::{FrameEntry, MANIFEST_NAME, peak_memory_bytes};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -16,6 +17,8 @@ pub struct Summary {
     /// Samples which were not finite, and numbers too large for 16 bits.
     non_finite: u64,
     saturated: u64,
+    /// What the photons of all frames came to.
+    photons: Option<PhotonReport>,
     /// Frames rendered by this run, and frames found finished.
     pub rendered: usize,
     pub kept: usize,
@@ -30,6 +33,7 @@ impl Summary {
             rays: 0,
             non_finite: 0,
             saturated: 0,
+            photons: None,
             rendered: 0,
             kept,
         }
@@ -41,6 +45,9 @@ impl Summary {
         self.rays += entry.report.rays;
         self.non_finite += entry.report.non_finite;
         self.saturated += entry.saturated;
+        if let Some(photons) = &entry.report.photons {
+            self.photons = Some(self.photons.take().map_or(*photons, |sum| sum.plus(photons)));
+        }
         let in_stages: f64 = entry.report.stage_seconds.iter().map(|(_, seconds)| seconds).sum();
         let files = ("develop and write", (entry.wall_seconds - in_stages).max(0.0));
         for &(stage, seconds) in entry.report.stage_seconds.iter().chain([&files]) {
@@ -96,6 +103,9 @@ impl Summary {
             format::count(self.rays as f64),
             format::count(self.rays as f64 / seconds.as_secs_f64().max(f64::MIN_POSITIVE))
         ));
+        if let Some(photons) = &self.photons {
+            lines.push(format!("  photons  {}", photon_line(photons)));
+        }
         if let Some(bytes) = peak_memory_bytes() {
             lines.push(format!("  memory   {} at most", format::bytes(bytes)));
         }
@@ -109,8 +119,26 @@ impl Summary {
         json!({
             "outcome": outcome, "rendered": self.rendered, "kept": self.kept,
             "seconds": self.start.elapsed().as_secs_f64(), "stage_seconds": stages,
-            "samples": self.samples, "rays": self.rays,
+            "samples": self.samples, "rays": self.rays, "photons": self.photons,
             "peak_memory_bytes": peak_memory_bytes(), "out": folder,
         })
     }
+}
+
+/// Photons of all frames in one line.
+fn photon_line(photons: &PhotonReport) -> String {
+    let PhotonReport { emitted, stored, global, caustics, radii, memory_bytes, .. } = photons;
+    let seconds = |s: f64| format::duration(Duration::from_secs_f64(s));
+    format!(
+        "{} emitted in {}, {} kept; {} at once in the map, {} caustic, in {} and {}; radii {:.3e} to {:.3e} m",
+        format::count(*emitted as f64),
+        seconds(photons.trace_seconds),
+        format::count(*stored as f64),
+        format::count(*global as f64),
+        format::count(*caustics as f64),
+        format::bytes(*memory_bytes),
+        seconds(photons.build_seconds),
+        radii.0,
+        radii.1
+    )
 }

@@ -6,6 +6,7 @@ mod diagnostic;
 mod light;
 mod material;
 mod motion;
+mod photons;
 mod read;
 mod scene;
 mod settings;
@@ -21,6 +22,7 @@ pub use material::{Attenuation, Material, Metal};
 pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
+pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};

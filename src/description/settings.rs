@@ -1,5 +1,6 @@
 //! The clock and the settings of a render.
 
+use super::{Caustics, PhotonSettings};
 use serde::{Deserialize, Serialize};
 
 /// The frames of a scene and when they are taken.
@@ -46,6 +47,13 @@ pub struct RenderSettings {
     pub share: u32,
     /// How light is simulated.
     pub integrator: IntegratorChoice,
+    /// Where caustics come from with the integrator `Path`.
+    pub caustics: Caustics,
+    /// How photons are traced and gathered.
+    pub photons: PhotonSettings,
+    /// Rays which gather indirect light at the first diffuse surface, with the integrator
+    /// `PhotonMap`; 0 reads it from the photons there. Trades time for blotches (bias).
+    pub final_gather: u32,
     /// Seed of every random decision.
     pub seed: u64,
     /// The pixel filter.
@@ -79,6 +87,9 @@ impl Default for RenderSettings {
             roulette_gain: 2.5,
             share: 4,
             integrator: IntegratorChoice::Auto,
+            caustics: Caustics::default(),
+            photons: PhotonSettings::default(),
+            final_gather: 0,
             seed: 0,
             filter: Filter::default(),
             clamp_indirect: None,
@@ -100,6 +111,10 @@ pub enum IntegratorChoice {
     Auto,
     /// Unidirectional path tracing.
     Path,
+    /// Photon mapping in two passes: photons, then the picture.
+    PhotonMap,
+    /// Stochastic progressive photon mapping.
+    Sppm,
 }
 
 /// How the trees of meshes are built.

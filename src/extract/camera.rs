@@ -145,6 +145,18 @@ impl ViewCamera {
         }
     }
 
+    /// How large a pixel is: its side at the camera, metres, and by how much it grows with each metre of
+    /// distance.
+    pub fn pixel_size(&self, time: f32) -> (f64, f64) {
+        let height = f64::from(self.size.1);
+        match &self.projection {
+            Projection::Perspective { tan_half_fov } => {
+                (0.0, 2.0 * at(tan_half_fov, f64::from(time)) / height)
+            }
+            Projection::Orthographic { half_height } => (2.0 * half_height / height, 0.0),
+        }
+    }
+
     /// Where a point of render space appears on the film at `time`, in pixels; `None` behind the
     /// camera.
     pub fn project(&self, p: DVec3, time: f32) -> Option<DVec2> {

@@ -10,6 +10,7 @@ mod emissions;
 mod instance;
 mod instances;
 mod lights;
+mod method;
 mod requirements;
 mod resting;
 mod surfaces;
@@ -19,6 +20,7 @@ pub use emissions::{Emissions, SurfaceEmission, extract_emissions};
 pub use instance::{Geometry, Instance, NOTHING};
 pub use instances::{Instances, Meshes, extract_instances, extract_meshes};
 pub use lights::{PunctualLight, PunctualLights, extract_lights};
+pub use method::{ChosenIntegrator, Method, choose_integrator};
 pub use requirements::{Feature, Requirements, derive_requirements};
 pub use resting::{RestingMesh, RestingMeshes, extract_resting_meshes};
 pub use surfaces::{SurfaceSlots, Surfaces, extract_surfaces};
@@ -38,6 +40,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(Emissions::default());
     world.insert_resource(PunctualLights::default());
     world.insert_resource(Requirements::default());
+    world.insert_resource(ChosenIntegrator::default());
     frame.add_systems(
         (
             extract_camera,
@@ -54,6 +57,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
             extract_lights,
             stamp("lights"),
             derive_requirements,
+            choose_integrator,
             stamp("requirements"),
         )
             .chain()

@@ -2,7 +2,7 @@
 
 use super::{Instances, Meshes, PunctualLights, Surfaces, ViewCamera};
 use crate::description::Light;
-use crate::world::{Deformation, Name, Shape, ShutterMotion, VertexMotion};
+use crate::world::{Deformation, Name, Settings, Shape, ShutterMotion, VertexMotion};
 use bevy_ecs::prelude::*;
 
 /// Something that a scene may require.
@@ -31,8 +31,6 @@ pub enum Feature {
 pub struct Requirements {
     /// Each feature once, with what asks for it.
     pub features: Vec<(Feature, String)>,
-    /// What the integrator cannot find, in words for the user.
-    pub warnings: Vec<String>,
 }
 
 impl Requirements {
@@ -47,12 +45,14 @@ impl Requirements {
 pub struct Census {
     masked: usize,
     absorbing: usize,
+    /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
+    storable: usize,
 }
 
 impl Census {
     /// Counts the objects; each material is looked at once.
-    fn take(instances: &Instances, surfaces: &Surfaces) -> Self {
+    fn take(instances: &Instances, surfaces: &Surfaces, min_alpha: f32) -> Self {
         let mut objects = vec![0; surfaces.default_material as usize + 1];
         for instance in &instances.list {
             if let Some(count) = objects.get_mut(instance.material as usize) {
@@ -60,13 +60,14 @@ impl Census {
             }
         }
         let materials = &surfaces.materials;
-        let middle = glam::Vec2::splat(0.5);
         let mut census = Self::default();
         for (material, count) in (0..).zip(objects).filter(|(_, count)| *count > 0) {
             census.masked += if materials.has_opacity(material) { count } else { 0 };
             census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
-            let specular = !materials.bsdf(material, middle, &mut 0.5).has_non_delta();
+            let specular = materials.may_cast_caustics(material, min_alpha);
             census.specular += if specular { count } else { 0 };
+            let storable = materials.may_be_storable(material, min_alpha);
+            census.storable += if storable { count } else { 0 };
         }
         census
     }
@@ -80,6 +81,7 @@ pub fn derive_requirements(
     surfaces: Res<Surfaces>,
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
+    settings: Res<Settings>,
     named: Query<(&ShutterMotion, &Name), With<Shape>>,
     mut census: Local<Census>,
     deforming: Query<(Option<&Name>, &VertexMotion), With<Deformation>>,
@@ -87,11 +89,11 @@ pub fn derive_requirements(
 ) {
     let rewritten = instances.is_changed();
     let looks = surfaces.is_changed() || lights.is_changed() || camera.is_changed();
-    if !(rewritten || looks || meshes.is_changed()) {
+    if !(rewritten || looks || meshes.is_changed() || settings.is_changed()) {
         return;
     }
-    if surfaces.is_changed() || (rewritten && instances.restructured) {
-        *census = Census::take(&instances, &surfaces);
+    if surfaces.is_changed() || settings.is_changed() || (rewritten && instances.restructured) {
+        *census = Census::take(&instances, &surfaces, settings.0.photons.min_alpha());
     }
     let mut found = Requirements::default();
     let mut require = |feature, reason: String| found.features.push((feature, reason));
@@ -128,16 +130,9 @@ pub fn derive_requirements(
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
     }
-    if census.specular > 0 {
-        require(Feature::Caustics, format!("{} mirrors or clear solids", census.specular));
-        let points = lights.0.iter().filter(|light| is_point_like(&light.light)).count();
-        if points > 0 {
-            found.warnings.push(format!(
-                "paths from {points} point-like lights over mirrors or through glass are out of \
-                 reach of `Path`: their caustics and what stands behind glass stay dark; give the \
-                 light a size (a small emitting sphere, an angle)"
-            ));
-        }
+    if census.specular > 0 && census.storable > 0 {
+        let reason = format!("{} mirrors, clear or polished objects", census.specular);
+        require(Feature::Caustics, reason);
     }
     requirements.set_if_neq(found);
 }
@@ -154,13 +149,4 @@ fn first_names(named: Query<(&ShutterMotion, &Name), With<Shape>>) -> String {
         }
     }
     first.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
-/// Whether no path that is drawn without looking at a light can meet it.
-fn is_point_like(light: &Light<u32>) -> bool {
-    match light {
-        Light::Point { .. } | Light::Spot { .. } => true,
-        Light::Directional { angle, .. } => *angle == 0.0,
-        Light::Sky { .. } => false,
-    }
 }

@@ -1,5 +1,6 @@
 //! All samples of all pixels: tiles in parallel, each pixel's samples in order.
 
+use super::photon_passes::PhotonReport;
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
 use crate::description::RenderSettings;
@@ -23,19 +24,45 @@ pub struct IntegrateStatus {
     pub error: Option<FilmError>,
     /// What happened on the paths.
     pub counters: PathCounters,
+    /// What the photons came to.
+    pub photons: Option<PhotonReport>,
+    /// What the user should know of this frame.
+    pub warnings: Vec<String>,
 }
 
 /// Everything but the scene that decides the samples of a tile.
-struct Job<'a> {
-    settings: &'a RenderSettings,
-    filter: FilterSampler,
-    frame: u32,
+pub(super) struct Job<'a> {
+    pub(super) settings: &'a RenderSettings,
+    pub(super) filter: FilterSampler,
+    pub(super) frame: u32,
     /// Whether anything depends on the time in the shutter.
-    has_time: bool,
-    has_lens: bool,
+    pub(super) has_time: bool,
+    pub(super) has_lens: bool,
     /// Side of the groups of pixels which share their paths; 1 for none.
     share: u32,
-    control: &'a RenderControl,
+    pub(super) control: &'a RenderControl,
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn new(
+        settings: &'a RenderSettings,
+        scene: &SceneView,
+        frame: u32,
+        control: &'a RenderControl,
+    ) -> Self {
+        let requires = |feature| scene.requirements.has(feature);
+        Self {
+            settings,
+            filter: FilterSampler::new(&settings.filter),
+            frame,
+            has_time: requires(Feature::Motion)
+                || requires(Feature::CameraMotion)
+                || requires(Feature::Deformation),
+            has_lens: requires(Feature::Lens),
+            share: shared_side(settings, scene.requirements),
+            control,
+        }
+    }
 }
 
 /// Fills the film of this frame.
@@ -61,17 +88,7 @@ pub fn render_film(
     };
     let scene = tables.view();
     let requires = |feature| scene.requirements.has(feature);
-    let job = Job {
-        settings,
-        filter: FilterSampler::new(&settings.filter),
-        frame: clock.frame,
-        has_time: requires(Feature::Motion)
-            || requires(Feature::CameraMotion)
-            || requires(Feature::Deformation),
-        has_lens: requires(Feature::Lens),
-        share: shared_side(settings, scene.requirements),
-        control: &control,
-    };
+    let job = Job::new(settings, &scene, clock.frame, &control);
     let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
     let counters = match (requires(Feature::Opacity), requires(Feature::Absorption)) {
         (false, false) => fill(&mut film, &begin.tracer::<false, false>(), &job),
@@ -97,15 +114,15 @@ fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
 }
 
 /// What an integrator begins with, whatever its generic parameters.
-struct Begin<'a> {
-    scene: SceneView<'a>,
-    settings: &'a RenderSettings,
-    origin: &'a FrameOrigin,
-    first_hit: bool,
+pub(super) struct Begin<'a> {
+    pub(super) scene: SceneView<'a>,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) origin: &'a FrameOrigin,
+    pub(super) first_hit: bool,
 }
 
 impl<'a> Begin<'a> {
-    fn tracer<const OPACITY: bool, const ABSORPTION: bool>(
+    pub(super) fn tracer<const OPACITY: bool, const ABSORPTION: bool>(
         &self,
     ) -> PathTracer<'a, OPACITY, ABSORPTION> {
         PathTracer {

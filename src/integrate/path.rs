@@ -67,7 +67,7 @@ impl PathCounters {
 
 /// How the path arrived where it is: what the weight of an emitter found there depends on.
 #[derive(Clone, Copy)]
-enum Arrival {
+pub(super) enum Arrival {
     /// From the camera or over a lobe without extent: no light sample could have found it.
     Sure,
     /// In a direction of this density from this receiver.
@@ -305,7 +305,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     }
 
     /// Light from infinitely far away along a ray which meets nothing.
-    fn infinite(&self, ray: &Ray, arrival: Arrival) -> Rgb {
+    pub(super) fn infinite(&self, ray: &Ray, arrival: Arrival) -> Rgb {
         let (from, pdf) = match &arrival {
             Arrival::Sure => (None, None),
             Arrival::Drawn { from, pdf } => (Some(from), Some(*pdf)),
@@ -321,7 +321,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     }
 
     /// What the surface that was met emits along the path, weighted.
-    fn emitted(
+    pub(super) fn emitted(
         &self,
         hit: &Hit,
         surface: &SurfacePoint,
@@ -343,7 +343,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
 
     /// Light which arrives straight from a light, by one connection: with its unit direction and its
     /// distance in metres.
-    fn direct(
+    pub(super) fn direct(
         &self,
         vertex: &Vertex,
         receiver: &Receiver,
@@ -373,7 +373,13 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
 
     /// The material of the solid in which a path goes on from a vertex in the direction `wi`, when it
     /// arrived inside `inside`; [`NOTHING`] outside.
-    fn medium_towards(&self, wi: Vec3, vertex: &Vertex, material: u32, inside: u32) -> u32 {
+    pub(super) fn medium_towards(
+        &self,
+        wi: Vec3,
+        vertex: &Vertex,
+        material: u32,
+        inside: u32,
+    ) -> u32 {
         if !vertex.crosses(wi) || !self.scene.surfaces.materials.is_dielectric(material) {
             return inside;
         }
@@ -412,7 +418,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     }
 
     /// Beer and Lambert's law inside a solid of this material over a distance in metres; 1 outside.
-    fn transmittance(&self, material: u32, distance: f64) -> Rgb {
+    pub(super) fn transmittance(&self, material: u32, distance: f64) -> Rgb {
         if material == NOTHING {
             return Rgb::ONE;
         }
@@ -425,14 +431,14 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     }
 
     /// The knob `clamp_indirect`; what the camera or its first surface sees is never limited.
-    fn limited(&self, radiance: Rgb, depth: u32) -> Rgb {
+    pub(super) fn limited(&self, radiance: Rgb, depth: u32) -> Rgb {
         match self.clamp_indirect {
             Some(limit) if depth > 0 => radiance.min(Rgb::splat(limit)),
             _ => radiance,
         }
     }
 
-    fn first_hit(
+    pub(super) fn first_hit(
         &self,
         camera_ray: &CameraRay,
         ray: &Ray,

@@ -129,6 +129,19 @@ impl Width {
         }
     }
 
+    /// Bounds of the width over the surface; a texture may ask for any.
+    fn narrowest(self) -> f32 {
+        if let Self::Constant(alpha) = self { alpha } else { 0.0 }
+    }
+
+    fn widest(self) -> f32 {
+        match self {
+            Self::Smooth => 0.0,
+            Self::Constant(alpha) => alpha,
+            Self::Texture(_) => 1.0,
+        }
+    }
+
     fn widths(self) -> Option<Widths> {
         match self {
             Self::Smooth => None,
@@ -326,6 +339,49 @@ impl MaterialTable {
     #[inline]
     pub fn has_opacity(&self, material: u32) -> bool {
         self.materials[material as usize].has_opacity
+    }
+
+    /// Whether [`Bsdf::is_storable`] can be true of a point of the material.
+    pub fn may_be_storable(&self, material: u32, min_alpha: f32) -> bool {
+        match &self.materials[material as usize].kind {
+            Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Principled { .. } => true,
+            Kind::Mirror { .. } | Kind::ThinGlass { .. } => false,
+            Kind::Dielectric { width, .. } | Kind::Conductor { width, .. } => {
+                width.widest() >= min_alpha
+            }
+            Kind::Mix { a, b, .. } => {
+                self.may_be_storable(*a, min_alpha) || self.may_be_storable(*b, min_alpha)
+            }
+            Kind::Masked { material, .. } => self.may_be_storable(*material, min_alpha),
+        }
+    }
+
+    /// Whether the material can pass light on so sharply that it makes caustics: by a lobe without
+    /// extent, or because it is not storable at some point.
+    pub fn may_cast_caustics(&self, material: u32, min_alpha: f32) -> bool {
+        match &self.materials[material as usize].kind {
+            Kind::Diffuse { .. } => false,
+            Kind::Mirror { .. } | Kind::ThinGlass { .. } => true,
+            Kind::Dielectric { width, .. }
+            | Kind::Conductor { width, .. }
+            | Kind::Principled { width, .. } => width.narrowest() < min_alpha,
+            // The rough coat goes with its base, which is diffuse.
+            Kind::Plastic { width, .. } => width.narrowest() == 0.0,
+            Kind::Mix { a, b, .. } => {
+                self.may_cast_caustics(*a, min_alpha) || self.may_cast_caustics(*b, min_alpha)
+            }
+            Kind::Masked { material, .. } => self.may_cast_caustics(*material, min_alpha),
+        }
+    }
+
+    /// Number of materials.
+    pub fn len(&self) -> usize {
+        self.materials.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.materials.is_empty()
     }
 
     /// What a solid of this material holds; `None` for all but [`Material::Dielectric`], masked or

@@ -1,7 +1,10 @@
-//! Lights: which there are, choosing one, and drawing a direction towards it.
+//! Lights: which there are, choosing one, drawing a direction towards it, and drawing a photon which
+//! leaves it.
 
+mod aim;
 mod bounds;
 mod choice;
+mod emission;
 mod node;
 mod shapes;
 mod sky;
@@ -10,6 +13,8 @@ mod table;
 mod towards;
 mod tree;
 
+pub use aim::{Aim, BoundingSphere};
+pub use emission::{EmittedPhoton, PhotonNumbers, PhotonSource, rebuild_photon_source};
 pub use shapes::{ShapeLights, prepare_shape_lights};
 pub use sky::SkyLight;
 pub use table::{Emitted, Emitter, LightTable, rebuild_light_table};

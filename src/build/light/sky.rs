@@ -7,7 +7,7 @@
 use crate::description::{ImageData, Rgb, Value};
 use crate::math::Frame;
 use crate::sampling::Piecewise2D;
-use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
+use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere};
 use crate::shade::{MaterialTable, RenderTexture};
 use glam::{DAffine3, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -104,6 +104,15 @@ impl SkyLight {
                 let pdf = pdf_square * jacobian(uv.y)?;
                 Some((from_light(render_from_light, direction), pdf))
             }
+        }
+    }
+
+    /// Draws a direction towards the sky for no receiver in particular, and its density per unit
+    /// solid angle: evenly over the sphere for a constant sky, by the map otherwise.
+    pub fn sample_all_around(&self, u: Vec2, render_from_light: &DAffine3) -> Option<(Vec3, f32)> {
+        match &self.map {
+            None => Some((uniform_sphere(u), 1.0 / (2.0 * TAU))),
+            Some(_) => self.sample(Vec3::Z, u, render_from_light),
         }
     }
 

@@ -50,6 +50,11 @@ pub struct LightTable {
     pub(super) emitters: Vec<Emitter>,
     /// How one of them is chosen.
     pub(super) choice: LightChoice,
+    /// Flux of each emitter which has a place, luminance, W.
+    pub(super) near_flux: Vec<f64>,
+    /// For each emitter infinitely far away the irradiance of a plane which faces it, or of a sky
+    /// from all around, luminance, W·m⁻².
+    pub(super) far_irradiance: Vec<f64>,
     /// First emitter of each instance, or [`NOTHING`].
     pub(super) first_of_instance: Vec<u32>,
     /// Emitter of each light without a shape.
@@ -131,6 +136,9 @@ pub fn rebuild_light_table(
     builder.add_punctual(&punctual.0, if textures { &[] } else { &skies });
     let choose = if table.by_power { LightChoice::by_power } else { LightChoice::new };
     table.choice = choose(&scratch.near, &scratch.far);
+    table.near_flux.clear();
+    table.near_flux.extend(scratch.near.iter().map(|light| light.flux));
+    table.far_irradiance.clone_from(&scratch.far);
     table.built = true;
 }
 

@@ -264,11 +264,17 @@ impl Lights<'_> {
         })
     }
 
-    fn radiance_of(&self, emitted: &Emitted, uv: Vec2) -> Rgb {
+    pub(super) fn radiance_of(&self, emitted: &Emitted, uv: Vec2) -> Rgb {
         self.materials.color(&emitted.radiance, uv) * emitted.factor
     }
 
-    fn triangle(&self, instance: u32, triangle: u32, time: f32, map: &DAffine3) -> [DVec3; 3] {
+    pub(super) fn triangle(
+        &self,
+        instance: u32,
+        triangle: u32,
+        time: f32,
+        map: &DAffine3,
+    ) -> [DVec3; 3] {
         let Geometry::Mesh(mesh) = self.geometry.instances[instance as usize].geometry else {
             unreachable!("only meshes have triangles");
         };
@@ -446,7 +452,7 @@ impl Lights<'_> {
 }
 
 /// The direction in which a light shines: its local −z.
-fn axis_of(map: &DAffine3) -> Vec3 {
+pub(super) fn axis_of(map: &DAffine3) -> Vec3 {
     -map.matrix3.z_axis.normalize().as_vec3()
 }
 
@@ -458,15 +464,15 @@ fn area_to_solid_angle(pdf_area: f64, to: DVec3, n: Vec3) -> f64 {
 }
 
 /// The cone of directions from which a distant light with an extent shines.
-struct DistantCone {
-    one_minus_cos_max: f32,
+pub(super) struct DistantCone {
+    pub(super) one_minus_cos_max: f32,
     /// `π·sin²θ`: what turns the irradiance of a facing plane into radiance.
-    projected_solid_angle: f32,
+    pub(super) projected_solid_angle: f32,
 }
 
 impl DistantCone {
     /// For an angular diameter in degrees; `None` for 0.
-    fn new(angle_deg: f32) -> Option<Self> {
+    pub(super) fn new(angle_deg: f32) -> Option<Self> {
         let half = 0.5 * f64::from(angle_deg).to_radians();
         let sin2 = half.sin().powi(2);
         // The smaller of the two forms of 1 − cos θ which does not cancel
@@ -477,14 +483,14 @@ impl DistantCone {
         })
     }
 
-    fn pdf(&self) -> f32 {
+    pub(super) fn pdf(&self) -> f32 {
         1.0 / (TAU * self.one_minus_cos_max)
     }
 }
 
 /// Falloff of a spot light: 1 inside, 0 outside the half angle, a smooth cubic in the cosine over the
 /// outer `blend` of the angle.
-fn spot_falloff(cos: f32, angle_deg: f32, blend: f32) -> f32 {
+pub(super) fn spot_falloff(cos: f32, angle_deg: f32, blend: f32) -> f32 {
     let outer = angle_deg.to_radians().cos();
     let inner = (angle_deg * (1.0 - blend)).to_radians().cos();
     if cos >= inner {

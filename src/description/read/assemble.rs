@@ -12,8 +12,8 @@ use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::{
-    Clock, Encoding, Filter, ImageData, RenderSettings, SceneDescription, Texture, TriangleMesh,
-    Waves,
+    Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription, Texture,
+    TriangleMesh, Waves,
 };
 use indexmap::IndexMap;
 use indexmap::map::Entry;
@@ -268,6 +268,7 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
         ("roulette_gain", f64::from(render.roulette_gain), &limits::ROULETTE_GAIN),
         ("share", f64::from(render.share), &limits::GROUP),
         ("clamp_indirect", f64::from(render.clamp_indirect.unwrap_or(1.0)), &limits::POSITIVE),
+        ("final_gather", f64::from(render.final_gather), &limits::GATHER),
         ("motion_tolerance", render.motion_tolerance, &limits::TOLERANCE),
         ("exposure", f64::from(render.exposure), &limits::STOPS),
     ];
@@ -275,6 +276,9 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
         if let Some(field) = fields.get(name) {
             limits::number(report, field, value, limits);
         }
+    }
+    if let Some(photons) = fields.get("photons") {
+        check_photons(&render.photons, photons, report);
     }
     if let Some(filter) = fields.get("filter") {
         let (sigma, radius) = match render.filter {
@@ -298,6 +302,21 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
                 report.at("scene::duplicate", &layers.nth(index), message);
             }
         }
+    }
+}
+
+fn check_photons(photons: &PhotonSettings, cursor: &Cursor, report: &mut Report) {
+    let numbers = [
+        ("per_pass", f64::from(photons.per_pass.unwrap_or(1)), &limits::PHOTONS),
+        ("alpha", f64::from(photons.alpha), &limits::ALPHA),
+        ("radius", f64::from(photons.radius), &limits::RADIUS),
+        ("largest_radius", f64::from(photons.largest_radius), &limits::POSITIVE_SHARE),
+        ("nearest", f64::from(photons.nearest), &limits::NEAREST),
+        ("min_roughness", f64::from(photons.min_roughness), &limits::SHARE),
+        ("max_memory", f64::from(photons.max_memory), &limits::MEBIBYTES),
+    ];
+    for (name, value, limits) in numbers {
+        limits::number(report, &cursor.at(name), value, limits);
     }
 }
 

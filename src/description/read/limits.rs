@@ -89,6 +89,23 @@ pub(super) const GROUP: Limits = closed(1.0, 4.0, "pixels");
 /// Anything above zero.
 pub(super) const POSITIVE: Limits =
     Limits { min: 0.0, max: 1e18, open_min: true, open_max: false, unit: "" };
+/// Photons of a pass, or rays of a final gathering.
+pub(super) const PHOTONS: Limits = closed(1.0, 2_147_483_648.0, "photons");
+/// Rays of a final gathering.
+pub(super) const GATHER: Limits = closed(0.0, 65_536.0, "rays");
+/// Share of photons that the progressive radius keeps.
+pub(super) const ALPHA: Limits =
+    Limits { min: 0.0, max: 1.0, open_min: true, open_max: true, unit: "" };
+/// Gather radius in pixels.
+pub(super) const RADIUS: Limits =
+    Limits { min: 0.0, max: 1e6, open_min: true, open_max: false, unit: "pixels" };
+/// Shares which are not 0.
+pub(super) const POSITIVE_SHARE: Limits =
+    Limits { min: 0.0, max: 1.0, open_min: true, open_max: false, unit: "" };
+/// Photons of an estimate.
+pub(super) const NEAREST: Limits = closed(1.0, 1_000_000.0, "photons");
+/// Memory for photons.
+pub(super) const MEBIBYTES: Limits = closed(1.0, 1e9, "MiB");
 /// Exposure.
 pub(super) const STOPS: Limits = closed(-60.0, 60.0, "stops");
 /// Radius and width of the pixel filter.

@@ -47,6 +47,12 @@ impl<'t> RoughDielectric<'t> {
     /// interface is taken as smooth.
     pub(crate) const SMOOTH_BELOW_WIDTH: f32 = 1e-4;
 
+    /// Width of the microfacets.
+    #[inline]
+    pub(super) fn alpha(&self) -> f32 {
+        self.lost.alpha()
+    }
+
     /// * `eta` — index inside over outside.
     /// * `lost` — the table of single-bounce losses made for `eta`, at the width wanted.
     /// * `average` — mean reflectance of the smooth interface from outside.

@@ -1,0 +1,20 @@
+//! Photons: tracing them from the lights, and the map in which they are found again.
+//!
+//! ```text
+//! PhotonSource::emit ──> PhotonTracer ── deposits at storable surfaces ──> PhotonMap ── queries ──> integrators
+//! ```
+//!
+//! A surface is *storable* if it scatters into so many directions that light found there tells what
+//! it looks like: diffuse, or rougher than a setting. All else, mirrors, glass, polished metal, is
+//! called specular here: photons and camera paths pass on over it until something storable is met.
+//!
+//! Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*, chapters 5 to 8.
+
+mod kernel;
+mod map;
+mod photon;
+mod trace;
+
+pub use map::{PhotonMap, QueryPoint};
+pub use photon::Photon;
+pub use trace::{Keep, PhotonCounters, PhotonPass, PhotonStore, PhotonTracer};

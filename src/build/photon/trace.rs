@@ -1,0 +1,384 @@
+//! Following photons from the lights until they are absorbed or lost.
+//!
+//! At each surface the power changes by
+//!
+//! ```text
+//! Φ' = Φ·f*(ω_i → ω_o)·|cos θ_o| / (p·q),
+//! ```
+//!
+//! with the probability `q = min(1, max Φ'/max Φ)` (before the division by `q`) that the photon goes on, which keeps the
+//! powers even. Two things are different from a path which starts at the camera:
+//!
+//! - refraction does not scale power by `η²` ([`TransportMode::Importance`]);
+//! - where shading and geometric normal differ the BSDF is not symmetric. The adjoint is
+//!   `f* = f·(|ω_i·n_s| |ω_o·n_g|) / (|ω_i·n_g| |ω_o·n_s|)`, and a photon left at a surface counts
+//!   `|ω_i·n_s|/|ω_i·n_g|`, since photons arrive by the geometric cosine and light is scattered by the
+//!   shading one (Veach 1997, *Robust Monte Carlo Methods for Light Transport Simulation*, sections 5.2
+//!   and 5.3).
+//!
+//! Photons are left **before** it is decided whether a surface with holes stops them: what is kept is
+//! the light which arrives, and who looks at the surface decides about the hole himself. For the same
+//! reason they are left wherever the material may be storable, also where another side of a mixture is
+//! drawn.
+
+use super::Photon;
+use crate::build::bvh::{SceneGeometry, SurfacePoint};
+use crate::build::light::{Aim, EmittedPhoton, Lights, PhotonNumbers, PhotonSource};
+use crate::description::Rgb;
+use crate::extract::NOTHING;
+use crate::math::{Frame, Ray, offset_ray_origin};
+use crate::sampling::{Sampler, dimension};
+use crate::shade::{Bsdf, BsdfSample, MaterialTable, TransportMode};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering::Relaxed;
+
+/// Photons which a worker traces in one go.
+const CHUNK: u32 = 1024;
+/// Stands in the place of the pixel for the random numbers of photons; no picture is that wide.
+const STREAM: u32 = 1 << 31;
+
+/// Which photons are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keep {
+    /// All, from the first surface on.
+    All,
+    /// All but those which come straight from a light.
+    Indirect,
+    /// Those which have met specular surfaces only, at least one. They end where they are left.
+    Caustics,
+}
+
+/// The photons of a pass: everything that decides them but the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct PhotonPass {
+    /// Seed of the render.
+    pub seed: u64,
+    /// The frame.
+    pub frame: u32,
+    /// Which pass.
+    pub pass: u32,
+    /// Photons emitted in each pass. For a power of two each pass is a whole set of the sequence.
+    pub emitted: u32,
+    /// Time in the shutter, the same for all photons.
+    pub time: f32,
+}
+
+/// What happened to the photons of a pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PhotonCounters {
+    /// Photons emitted, those without power included.
+    pub emitted: u64,
+    /// Photons left at surfaces.
+    pub stored: u64,
+    /// Rays traced.
+    pub rays: u64,
+    /// Photons given up at the greatest depth although they still carried something.
+    pub truncated: u64,
+}
+
+impl PhotonCounters {
+    /// The sum of both.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            emitted: self.emitted + other.emitted,
+            stored: self.stored + other.stored,
+            rays: self.rays + other.rays,
+            truncated: self.truncated + other.truncated,
+        }
+    }
+}
+
+/// The photons of a pass in the order in which they were emitted, a list for each worker's share. The
+/// memory is kept from pass to pass.
+#[derive(Clone, Debug, Default)]
+pub struct PhotonStore {
+    pub(super) chunks: Vec<Vec<Photon>>,
+}
+
+impl PhotonStore {
+    /// The photons in order.
+    pub fn iter(&self) -> impl Iterator<Item = &Photon> {
+        self.chunks.iter().flatten()
+    }
+
+    /// Adds a photon at the end.
+    pub fn push(&mut self, photon: Photon) {
+        if self.chunks.is_empty() {
+            self.chunks.push(Vec::new());
+        }
+        self.chunks.last_mut().expect("there is one").push(photon);
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.chunks.iter().map(Vec::len).sum()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        self.chunks.iter().map(|chunk| chunk.capacity() * size_of::<Photon>()).sum()
+    }
+}
+
+/// Traces photons. The generic parameters are those of the path tracer.
+#[derive(Clone, Copy)]
+pub struct PhotonTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
+    /// What photons meet.
+    pub geometry: SceneGeometry<'a>,
+    /// What it is made of.
+    pub materials: &'a MaterialTable,
+    /// What shines.
+    pub lights: Lights<'a>,
+    /// From where photons start.
+    pub source: &'a PhotonSource,
+    /// What they are aimed at.
+    pub aim: Option<&'a Aim>,
+    /// By material, whether photons are left there.
+    pub storable: &'a [bool],
+    /// Width α from which a rough surface is storable.
+    pub min_alpha: f32,
+    /// Greatest number of surface interactions.
+    pub max_depth: u32,
+    /// Which photons are kept.
+    pub keep: Keep,
+}
+
+impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSORPTION> {
+    /// Traces the photons of a pass into `store`, in parallel; the photons and their order do not
+    /// depend on the threads. `None` when `cancel` was set.
+    pub fn trace_pass(
+        &self,
+        pass: &PhotonPass,
+        store: &mut PhotonStore,
+        cancel: &AtomicBool,
+    ) -> Option<PhotonCounters> {
+        store.chunks.resize_with(pass.emitted.div_ceil(CHUNK) as usize, Vec::new);
+        let trace_chunk = |(chunk, photons): (u32, &mut Vec<Photon>)| {
+            photons.clear();
+            if cancel.load(Relaxed) {
+                return None;
+            }
+            let mut counters = PhotonCounters::default();
+            let first = chunk * CHUNK;
+            for index in first..first.saturating_add(CHUNK).min(pass.emitted) {
+                self.trace(pass, index, photons, &mut counters);
+            }
+            counters.stored = photons.len() as u64;
+            Some(counters)
+        };
+        let chunks = store.chunks.par_iter_mut().enumerate().map(|(k, c)| (k as u32, c));
+        chunks.map(trace_chunk).try_reduce(PhotonCounters::default, |a, b| Some(a.plus(b)))
+    }
+
+    /// Follows one photon.
+    fn trace(
+        &self,
+        pass: &PhotonPass,
+        index: u32,
+        photons: &mut Vec<Photon>,
+        counters: &mut PhotonCounters,
+    ) {
+        counters.emitted += 1;
+        let number = u64::from(pass.pass) * u64::from(pass.emitted) + u64::from(index);
+        let stream = (STREAM, (number >> 32) as u32);
+        let sampler = Sampler::new(pass.seed, pass.frame, stream, number as u32);
+        let numbers = PhotonNumbers {
+            light: sampler.one_fine(dimension::TIME),
+            point: sampler.two(dimension::FILM),
+            direction: sampler.two(dimension::LENS),
+            aim: sampler.one(dimension::TIME + 1),
+        };
+        let Some(photon) = self.source.emit(&self.lights, &numbers, pass.time, self.aim) else {
+            return;
+        };
+        let power = photon.power / pass.emitted as f32;
+        self.follow(EmittedPhoton { power, ..photon }, &sampler, photons, counters);
+    }
+
+    fn follow(
+        &self,
+        photon: EmittedPhoton,
+        sampler: &Sampler,
+        photons: &mut Vec<Photon>,
+        counters: &mut PhotonCounters,
+    ) {
+        let EmittedPhoton { mut ray, mut power } = photon;
+        let mut inside = NOTHING;
+        // Surface interactions, and surfaces met: those which let the photon pass count only here.
+        let mut depth = 0;
+        let mut met = 0;
+        let mut only_specular = true;
+        loop {
+            counters.rays += 1;
+            let Some(hit) = self.geometry.closest_hit(&ray, f64::INFINITY, false) else { return };
+            let material = self.geometry.instances[hit.instance as usize].material;
+            if material == NOTHING {
+                return;
+            }
+            if ABSORPTION {
+                power *= transmittance(self.materials, inside, hit.t);
+            }
+            let dimensions = dimension::vertex(met);
+            met += 1;
+            let surface = self.geometry.surface(&ray, &hit);
+            let caustic = only_specular && depth > 0;
+            let kept = match self.keep {
+                Keep::All => true,
+                Keep::Indirect => depth > 0,
+                Keep::Caustics => caustic,
+            };
+            if kept && self.storable[material as usize] {
+                leave(&surface, &ray, power, depth, caustic, photons);
+            }
+            let mut roulette = None;
+            if OPACITY {
+                let opacity = self.materials.opacity(material, surface.uv);
+                if opacity < 1.0 {
+                    let u = sampler.one(dimensions + dimension::ROULETTE);
+                    if u >= opacity {
+                        ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                        continue;
+                    }
+                    roulette = Some(u / opacity);
+                }
+            }
+            // What is left at a surface has met at most `max_depth` surfaces with that one.
+            if depth + 1 >= self.max_depth {
+                counters.truncated += 1;
+                return;
+            }
+            let mut lobe = sampler.one(dimensions + dimension::LOBE);
+            let bsdf = self.materials.bsdf(material, surface.uv, &mut lobe);
+            let storable = bsdf.is_storable(self.min_alpha);
+            if self.keep == Keep::Caustics && matches!(bsdf, Bsdf::Diffuse(_)) {
+                return;
+            }
+            let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
+            let scattering = Scattering::new(surface, -ray.d, bsdf);
+            let Some((wi, sample, weight)) = scattering.draw(lobe, direction) else { return };
+            only_specular &= sample.delta || !storable;
+            if self.keep == Keep::Caustics && !only_specular {
+                return;
+            }
+            let before = power.max_element();
+            power *= weight;
+            let survival = (power.max_element() / before).min(1.0);
+            let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
+            if u >= survival || survival.is_nan() {
+                return;
+            }
+            power /= survival;
+            depth += 1;
+            if ABSORPTION {
+                inside = scattering.medium_towards(self.materials, wi, material, inside);
+            }
+            let surface = &scattering.surface;
+            ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
+            ray.d = wi;
+        }
+    }
+}
+
+/// Leaves a photon at a surface.
+fn leave(
+    surface: &SurfacePoint,
+    ray: &Ray,
+    power: Rgb,
+    depth: u32,
+    caustic: bool,
+    photons: &mut Vec<Photon>,
+) {
+    let wi = -ray.d;
+    let (cos_g, cos_s) = (wi.dot(surface.ng), wi.dot(surface.ns));
+    // Where the two normals disagree about the side, camera paths use the geometric one.
+    let share = if cos_g * cos_s > 0.0 { cos_s / cos_g } else { 1.0 };
+    let power = power * share;
+    if power.is_finite() && power != Rgb::ZERO {
+        let position = surface.p.as_vec3();
+        photons.push(Photon::new(position, power, wi, surface.ng, depth, caustic));
+    }
+}
+
+/// A surface which scatters a photon.
+struct Scattering<'a> {
+    surface: SurfacePoint,
+    frame: Frame,
+    wo: Vec3,
+    bsdf: Bsdf<'a>,
+}
+
+impl<'a> Scattering<'a> {
+    fn new(mut surface: SurfacePoint, wo: Vec3, bsdf: Bsdf<'a>) -> Self {
+        // Seen from beyond its horizon a shading normal cannot say what is reflected where.
+        if wo.dot(surface.ns) * wo.dot(surface.ng) <= 0.0 {
+            surface.ns = surface.ng;
+        }
+        Self { surface, frame: surface.frame(), wo, bsdf }
+    }
+
+    fn crosses(&self, wi: Vec3) -> bool {
+        let ng = self.surface.ng;
+        (wi.dot(ng) > 0.0) != (self.wo.dot(ng) > 0.0)
+    }
+
+    /// Draws where the photon goes on, with the factor on its power.
+    fn draw(&self, lobe: f32, u: Vec2) -> Option<(Vec3, BsdfSample, Rgb)> {
+        let draw = |frame: &Frame| {
+            let wo = frame.to_local(self.wo);
+            let sample = self.bsdf.sample(wo, lobe, u, TransportMode::Importance)?;
+            Some((frame.from_local(sample.wi).normalize(), sample))
+        };
+        let (wi, sample) = draw(&self.frame)?;
+        if self.crosses(wi) == sample.transmitted {
+            return Some((wi, sample, sample.weight * self.adjoint(wi)));
+        }
+        if !sample.delta {
+            return None;
+        }
+        // Around the geometric normal there is nothing to correct.
+        let (wi, sample) = draw(&Frame::from_z(self.surface.ng))?;
+        (self.crosses(wi) == sample.transmitted).then_some((wi, sample, sample.weight))
+    }
+
+    /// `f*/f`.
+    fn adjoint(&self, wi: Vec3) -> f32 {
+        let SurfacePoint { ng, ns, .. } = self.surface;
+        if ng == ns {
+            return 1.0;
+        }
+        let ratio = (self.wo.dot(ns) * wi.dot(ng)) / (self.wo.dot(ng) * wi.dot(ns));
+        if ratio.is_finite() { ratio.abs() } else { 0.0 }
+    }
+
+    fn medium_towards(
+        &self,
+        materials: &MaterialTable,
+        wi: Vec3,
+        material: u32,
+        inside: u32,
+    ) -> u32 {
+        if !self.crosses(wi) || !materials.is_dielectric(material) {
+            return inside;
+        }
+        if wi.dot(self.surface.ng) < 0.0 { material } else { NOTHING }
+    }
+}
+
+/// Beer and Lambert's law inside a solid of this material over a distance in metres; 1 outside.
+fn transmittance(materials: &MaterialTable, material: u32, distance: f64) -> Rgb {
+    if material == NOTHING {
+        return Rgb::ONE;
+    }
+    materials.attenuation(material).map_or(Rgb::ONE, |sigma_a| {
+        // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
+        sigma_a.map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() })
+    })
+}

@@ -1,0 +1,524 @@
+//! Paths from the camera which gather photons.
+//!
+//! With `E` the camera, `L` a light, `S` a specular interaction (over a lobe without extent, or one too
+//! narrow to gather photons for) and `D` any other, every path belongs to one technique:
+//!
+//! ```text
+//!                        E S* L     E S* D L      E S* D S+ L            all others
+//! Sppm                   path       light rays    photons                photons
+//! PhotonMap              path       light rays    caustic photons        photons, or a final gathering
+//! Path with photons      path       light rays    caustic photons        path; …D S+ L: caustic photons
+//! ```
+//!
+//! "Light rays" is next-event estimation together with a ray drawn from the BSDF, weighted. Where caustic
+//! photons are gathered, at **every** `D` of the path, the path itself leaves out all that reaches a
+//! light over `D S+ L`: a light met by chance, and light rays from a glossy `S`.
+//!
+//! A final gathering sends rays from the first `D` and reads all photons where these meet a surface,
+//! the direct ones included. Where a ray is shorter than the disk over which it would read, the corner's
+//! other side would be read twice: it goes on as a path (Jensen 2001, *Realistic Image Synthesis
+//! Using Photon Mapping*, section 9.2.2; Christensen 1999, "Faster Photon Map Global Illumination",
+//! Journal of Graphics Tools 4(3)).
+
+use super::path::{Arrival, PathCounters, PathTracer};
+use super::vertex::Vertex;
+use crate::build::bvh::Hit;
+use crate::build::light::Receiver;
+use crate::build::photon::{PhotonMap, QueryPoint};
+use crate::description::{DirectLight, PhotonSettings, Rgb};
+use crate::extract::{CameraRay, Method, NOTHING};
+use crate::film::PixelSample;
+use crate::math::{Ray, offset_ray_origin};
+use crate::sampling::{Sampler, dimension};
+use crate::shade::{Bsdf, BsdfSample, TransportMode};
+use glam::{Vec2, Vec3};
+
+/// How much wider photons are gathered at points which the camera sees by a diffuse bounce: the
+/// bounce blurs what is found there anyway.
+const BEHIND_DIFFUSE: f32 = 4.0;
+/// Units in the last place of a position below which a disk cannot be resolved.
+const LEAST_RADIUS_ULPS: f32 = 32.0;
+
+/// The photons of a pass.
+#[derive(Clone, Copy)]
+pub(super) struct Maps<'a> {
+    /// All that the method reads at a diffuse point beside the caustics.
+    pub global: &'a PhotonMap,
+    /// Caustics, where they are kept apart.
+    pub caustics: &'a PhotonMap,
+}
+
+/// Follows camera paths for the methods with photons.
+#[derive(Clone, Copy)]
+pub(super) struct EyeTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
+    pub path: PathTracer<'a, OPACITY, ABSORPTION>,
+    pub method: Method,
+    pub settings: &'a PhotonSettings,
+    /// Rays of a final gathering.
+    pub final_gather: u32,
+    pub maps: Maps<'a>,
+    /// Side of a pixel at the camera, and its growth per metre.
+    pub pixel_size: (f32, f32),
+    /// Greatest radius of the first pass, metres.
+    pub largest_radius: f32,
+}
+
+/// Which random numbers a camera path has.
+#[derive(Clone, Copy)]
+pub(super) struct SampleKey {
+    pub seed: u64,
+    pub frame: u32,
+    pub pixel: (u32, u32),
+    pub index: u32,
+}
+
+impl SampleKey {
+    pub fn sampler(&self) -> Sampler {
+        Sampler::new(self.seed, self.frame, self.pixel, self.index)
+    }
+
+    /// The numbers of ray `k` of the `n` of a final gathering.
+    fn gather_ray(&self, k: u32, n: u32) -> Sampler {
+        // No picture is as wide as 2³⁰ pixels.
+        let place = (self.pixel.0 | 1 << 30, self.pixel.1);
+        Sampler::new(self.seed, self.frame, place, self.index.wrapping_mul(n).wrapping_add(k))
+    }
+}
+
+/// What a pass found for a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gathered {
+    /// Photons in the disks.
+    pub found: u32,
+    /// Smallest and greatest radius.
+    pub radii: (f32, f32),
+    /// Disks which could not shrink further.
+    pub unresolved: u32,
+}
+
+impl Default for Gathered {
+    fn default() -> Self {
+        Self { found: 0, radii: (f32::INFINITY, 0.0), unresolved: 0 }
+    }
+}
+
+/// What the path has met since its last diffuse surface.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Since {
+    /// There was none: only specular surfaces so far.
+    Never,
+    /// It was the last surface.
+    Diffuse,
+    /// Specular surfaces came after it.
+    Specular,
+}
+
+/// A path on its way.
+#[derive(Clone, Copy)]
+struct Walk {
+    ray: Ray,
+    throughput: Rgb,
+    eta_scale: f32,
+    arrival: Arrival,
+    since: Since,
+    inside: u32,
+    depth: u32,
+    met: u32,
+    /// Length of the path, metres.
+    length: f64,
+    /// Whether it belongs to a final gathering.
+    reads: bool,
+    /// Whether it only looks for a light.
+    last: bool,
+}
+
+/// What goes along with all walks of a sample.
+struct Context<'a> {
+    key: SampleKey,
+    camera_ray: &'a CameraRay,
+    /// Factor on the radius of the first pass.
+    scale: f32,
+    counters: &'a mut PathCounters,
+    gathered: Gathered,
+    sample: PixelSample,
+    distances: Vec<f32>,
+}
+
+impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPTION> {
+    /// The radiance which arrives along a camera ray, as this pass sees it.
+    pub fn sample(
+        &self,
+        camera_ray: &CameraRay,
+        key: SampleKey,
+        scale: f32,
+        counters: &mut PathCounters,
+    ) -> (PixelSample, Gathered) {
+        let walk = Walk {
+            ray: camera_ray.ray,
+            throughput: Rgb::ONE,
+            eta_scale: 1.0,
+            arrival: Arrival::Sure,
+            since: Since::Never,
+            inside: NOTHING,
+            depth: 0,
+            met: 0,
+            length: 0.0,
+            reads: false,
+            last: false,
+        };
+        let mut context = Context {
+            key,
+            camera_ray,
+            scale,
+            counters,
+            gathered: Gathered::default(),
+            sample: PixelSample { radiance: Rgb::ZERO, first_hit: None },
+            distances: Vec::new(),
+        };
+        self.walk(walk, &key.sampler(), &mut context);
+        (context.sample, context.gathered)
+    }
+
+    /// Whether light met by chance on this path is left to photons.
+    fn left_to_photons(&self, walk: &Walk) -> bool {
+        walk.since == Since::Specular && self.method != Method::Sppm
+    }
+
+    fn walk(&self, mut walk: Walk, sampler: &Sampler, context: &mut Context) {
+        while let Some(hit) = self.advance(&mut walk, context) {
+            if !self.interact(&mut walk, &hit, sampler, context) {
+                return;
+            }
+        }
+    }
+
+    /// The next surface; adds light from infinity where there is none.
+    fn advance(&self, walk: &mut Walk, context: &mut Context) -> Option<Hit> {
+        context.counters.rays += 1;
+        let from_camera = walk.met == 0;
+        let hit = self.path.scene.geometry.closest_hit(&walk.ray, f64::INFINITY, from_camera);
+        if hit.is_none() && !self.left_to_photons(walk) {
+            let light = self.path.infinite(&walk.ray, walk.arrival);
+            context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+        }
+        hit
+    }
+
+    /// Everything at one surface; whether the path goes on.
+    fn interact(
+        &self,
+        walk: &mut Walk,
+        hit: &Hit,
+        sampler: &Sampler,
+        context: &mut Context,
+    ) -> bool {
+        let scene = &self.path.scene;
+        let dimensions = dimension::vertex(walk.met);
+        walk.met += 1;
+        walk.length += hit.t;
+        let surface = scene.geometry.surface(&walk.ray, hit);
+        let material = scene.geometry.instances[hit.instance as usize].material;
+        let wo = -walk.ray.d;
+        if ABSORPTION {
+            walk.throughput *= self.path.transmittance(walk.inside, hit.t);
+        }
+        let mut roulette = None;
+        if OPACITY && material != NOTHING {
+            let opacity = scene.surfaces.materials.opacity(material, surface.uv);
+            if opacity < 1.0 {
+                let u = sampler.one(dimensions + dimension::ROULETTE);
+                if u >= opacity {
+                    walk.ray.o =
+                        offset_ray_origin(surface.p, surface.p_error, surface.ng, walk.ray.d);
+                    return true;
+                }
+                roulette = Some(u / opacity);
+            }
+        }
+        if !self.left_to_photons(walk) {
+            let time = walk.ray.time;
+            let emitted = self.path.emitted(hit, &surface, wo, time, walk.arrival);
+            context.sample.radiance += self.path.limited(walk.throughput * emitted, walk.depth);
+        }
+        if walk.last {
+            return false;
+        }
+        let mut lobe = sampler.one(dimensions + dimension::LOBE);
+        let bsdf = (material != NOTHING)
+            .then(|| scene.surfaces.materials.bsdf(material, surface.uv, &mut lobe));
+        if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
+            let ray = &walk.ray;
+            let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());
+            context.sample.first_hit = Some(first);
+        }
+        let Some(bsdf) = bsdf else { return false };
+        if walk.depth == self.path.max_depth {
+            context.counters.truncated += 1;
+            return false;
+        }
+        let vertex = Vertex::new(surface, wo, bsdf);
+        let receiver = vertex.receiver();
+        let storable = bsdf.is_storable(self.settings.min_alpha());
+        // A ray of a final gathering reads all photons where it is long enough.
+        let read_here = storable && walk.reads && self.read(walk, hit, &vertex, context);
+        let (direction, on_light) = sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
+        if !read_here {
+            if self.takes_light_rays(walk, &bsdf, storable) {
+                let choose = sampler.one_fine(dimensions + dimension::LIGHT);
+                self.light_rays(walk, &vertex, &receiver, (choose, on_light), material, context);
+            }
+            if storable {
+                self.gather_here(walk, &vertex, context);
+            }
+        }
+        let gathers = storable && self.gathers_finally(walk);
+        if gathers {
+            self.final_gathering(walk, &vertex, &receiver, material, context);
+        }
+        let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { return false };
+        let diffuse = storable && !drawn.delta;
+        if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
+            return false;
+        }
+        self.turn(walk, &vertex, &receiver, (wi, &drawn), diffuse, material);
+        if walk.last {
+            return true;
+        }
+        let u = || roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
+        if walk.depth >= self.path.roulette_depth {
+            let carried = (walk.throughput * walk.eta_scale).max_element();
+            let survival = (carried * self.path.roulette_gain).min(1.0);
+            if survival.is_nan() || u() >= survival {
+                return false;
+            }
+            walk.throughput /= survival;
+        }
+        true
+    }
+
+    /// Whether a path ends where a diffuse lobe would take it on; otherwise `Sppm` and `PhotonMap` send one ray
+    /// more, which looks for lights alone.
+    fn ends_at_diffuse(&self, walk: &mut Walk) -> bool {
+        match self.method {
+            Method::Sppm if self.settings.direct == DirectLight::Photons => true,
+            Method::Sppm => {
+                walk.last = true;
+                false
+            }
+            Method::PhotonMap => {
+                walk.last = !walk.reads;
+                false
+            }
+            Method::Path | Method::PathWithPhotons => false,
+        }
+    }
+
+    fn gathers_finally(&self, walk: &Walk) -> bool {
+        self.method == Method::PhotonMap
+            && self.final_gather > 0
+            && !walk.reads
+            && walk.since == Since::Never
+    }
+
+    /// Whether rays are sent to the lights from here.
+    fn takes_light_rays(&self, walk: &Walk, bsdf: &Bsdf, storable: bool) -> bool {
+        if !bsdf.has_non_delta() {
+            return false;
+        }
+        if storable {
+            return self.method != Method::Sppm || self.settings.direct == DirectLight::Sampled;
+        }
+        self.method == Method::Sppm || walk.since == Since::Never
+    }
+
+    /// Sends a ray to a point of a light, drawn by these numbers.
+    fn light_rays(
+        &self,
+        walk: &Walk,
+        vertex: &Vertex,
+        receiver: &Receiver,
+        (choose, on_light): (f64, Vec2),
+        material: u32,
+        context: &mut Context,
+    ) {
+        let time = walk.ray.time;
+        let (wi, distance, mut light) =
+            self.path.direct(vertex, receiver, choose, on_light, time, context.counters);
+        if ABSORPTION && light != Rgb::ZERO {
+            let medium = self.path.medium_towards(wi, vertex, material, walk.inside);
+            light *= self.path.transmittance(medium, distance);
+        }
+        context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+    }
+
+    /// Gathers what the method has at a storable point of a camera path.
+    fn gather_here(&self, walk: &Walk, vertex: &Vertex, context: &mut Context) {
+        let mut light = Rgb::ZERO;
+        let global = match self.method {
+            Method::Sppm => true,
+            Method::PhotonMap => self.final_gather == 0,
+            Method::Path | Method::PathWithPhotons => false,
+        };
+        if global {
+            light += self.gather(self.maps.global, walk, vertex, context);
+        }
+        if self.method != Method::Sppm {
+            light += self.gather(self.maps.caustics, walk, vertex, context);
+        }
+        context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+    }
+
+    /// Reads all photons at the end of a ray of a final gathering; `false` if the ray is too short.
+    fn read(&self, walk: &Walk, hit: &Hit, vertex: &Vertex, context: &mut Context) -> bool {
+        let query = self.query(self.maps.global, walk, vertex, context);
+        if hit.t < f64::from(query.radius) {
+            return false;
+        }
+        let light = self.estimate(self.maps.global, &query, walk, vertex, context);
+        context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+        true
+    }
+
+    /// Sends the rays of a final gathering over the lobes which are not deltas.
+    fn final_gathering(
+        &self,
+        walk: &Walk,
+        vertex: &Vertex,
+        receiver: &Receiver,
+        material: u32,
+        context: &mut Context,
+    ) {
+        let n = self.final_gather;
+        for k in 0..n {
+            let sampler = context.key.gather_ray(k, n);
+            let dimensions = dimension::vertex(walk.met - 1);
+            let lobe = sampler.one(dimensions + dimension::LOBE);
+            let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
+            let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { continue };
+            if drawn.delta {
+                continue; // the camera path itself goes on there
+            }
+            let mut ray = Walk { reads: true, throughput: walk.throughput / n as f32, ..*walk };
+            self.turn(&mut ray, vertex, receiver, (wi, &drawn), true, material);
+            self.walk(ray, &sampler, context);
+        }
+    }
+
+    /// Sends a path on in the direction drawn.
+    fn turn(
+        &self,
+        walk: &mut Walk,
+        vertex: &Vertex,
+        receiver: &Receiver,
+        (wi, drawn): (Vec3, &BsdfSample),
+        diffuse: bool,
+        material: u32,
+    ) {
+        walk.throughput *= drawn.weight;
+        walk.eta_scale *= drawn.eta * drawn.eta;
+        walk.depth += 1;
+        if ABSORPTION {
+            walk.inside = self.path.medium_towards(wi, vertex, material, walk.inside);
+        }
+        walk.since = match (diffuse, walk.since) {
+            (true, _) => Since::Diffuse,
+            (false, Since::Never) => Since::Never,
+            (false, _) => Since::Specular,
+        };
+        walk.arrival = if drawn.delta || !self.path_takes_light(walk, diffuse) {
+            Arrival::Sure
+        } else {
+            Arrival::Drawn { from: *receiver, pdf: drawn.pdf }
+        };
+        let surface = &vertex.surface;
+        walk.ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
+        walk.ray.d = wi;
+    }
+
+    /// Whether rays were sent to the lights from the surface that is left.
+    fn path_takes_light(&self, walk: &Walk, diffuse: bool) -> bool {
+        diffuse || self.method == Method::Sppm || walk.since == Since::Never
+    }
+
+    /// The disk over which photons are gathered at a point of a path.
+    fn query(
+        &self,
+        map: &PhotonMap,
+        walk: &Walk,
+        vertex: &Vertex,
+        context: &mut Context,
+    ) -> QueryPoint {
+        let surface = &vertex.surface;
+        let position = surface.p.as_vec3();
+        let nearest = self.method == Method::PhotonMap;
+        let first = if nearest {
+            self.largest_radius
+        } else {
+            let (side, growth) = self.pixel_size;
+            // A pixel is stretched where the surface is seen from the side.
+            let stretch = vertex.wo.dot(surface.ng).abs().sqrt();
+            let footprint = (side + growth * walk.length as f32) / stretch;
+            let wider = if walk.since == Since::Never { 1.0 } else { BEHIND_DIFFUSE };
+            (self.settings.radius * footprint * wider).min(self.largest_radius)
+        };
+        let ulp = position.abs().max_element() * f32::EPSILON;
+        let least = LEAST_RADIUS_ULPS * ulp;
+        let mut radius = first * context.scale;
+        let mut query = QueryPoint { position, normal: surface.ng, radius };
+        if nearest {
+            let count = self.settings.nearest as usize;
+            radius = map.radius_of(&query, count, &mut context.distances);
+        }
+        context.gathered.unresolved += u32::from(radius < least);
+        query.radius = radius.max(least);
+        let (min, max) = context.gathered.radii;
+        context.gathered.radii = (min.min(query.radius), max.max(query.radius));
+        query
+    }
+
+    fn gather(&self, map: &PhotonMap, walk: &Walk, vertex: &Vertex, context: &mut Context) -> Rgb {
+        if map.is_empty() {
+            return Rgb::ZERO;
+        }
+        let query = self.query(map, walk, vertex, context);
+        self.estimate(map, &query, walk, vertex, context)
+    }
+
+    /// The radiance estimate `Σ f Φ K` over a disk.
+    fn estimate(
+        &self,
+        map: &PhotonMap,
+        query: &QueryPoint,
+        walk: &Walk,
+        vertex: &Vertex,
+        context: &mut Context,
+    ) -> Rgb {
+        let kernel = self.settings.kernel;
+        let radius2 = query.radius * query.radius;
+        let allowed = self.path.max_depth.saturating_sub(walk.depth);
+        let wo_local = vertex.frame.to_local(vertex.wo);
+        let mut light = Rgb::ZERO;
+        let mut found = 0;
+        map.gather(query, |photon, distance2| {
+            if u32::from(photon.depth) >= allowed {
+                return;
+            }
+            found += 1;
+            let wi = photon.wi();
+            if !vertex.is_consistent(wi) {
+                return;
+            }
+            let f = bsdf_value(&vertex.bsdf, wo_local, vertex.frame.to_local(wi));
+            light += f * photon.power * kernel.weight(distance2, radius2);
+        });
+        context.gathered.found += found;
+        light
+    }
+}
+
+/// The BSDF itself, without the cosine: that is in how densely photons arrive.
+#[inline]
+fn bsdf_value(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Rgb {
+    let f_cos = bsdf.evaluate(wo, wi, TransportMode::Radiance).f_cos;
+    if f_cos == Rgb::ZERO { Rgb::ZERO } else { f_cos / wi.z.abs() }
+}
