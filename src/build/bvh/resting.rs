@@ -54,7 +54,7 @@ impl RestingTree {
             let mesh = &meshes[member.mesh as usize];
             let base = shared.positions.len() as u32;
             starts.push((shared.triangles.len() as u32, member.instance));
-            shared.positions.extend(corners(member, mesh, origin).map(|p| p.as_vec3()));
+            shared.positions.extend(corners(member, mesh, origin).map(DVec3::as_vec3));
             shared.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + base)));
         }
         let tree = Some(Arc::new(MeshTree::build(Arc::new(shared), quality)));
