@@ -99,7 +99,7 @@ struct Path<'a> {
     boost: f32,
 }
 
-impl<'a> Path<'a> {
+impl Path<'_> {
     fn new(camera_ray: &CameraRay) -> Self {
         Self {
             ray: camera_ray.ray,
