@@ -290,7 +290,8 @@ fn shading_normals_look_the_same_to_photons() {
         }})"#
     );
     let reference = render_description(&described(&text, "integrator: Path", (16, 12), 1024), 0);
-    let photons = "integrator: Sppm, photons: (direct: Photons, per_pass: Some(65536), radius: 0.2)";
+    let photons =
+        "integrator: Sppm, photons: (direct: Photons, per_pass: Some(65536), radius: 0.2)";
     let pictures = seeds(&described(&text, photons, (16, 12), 16), 4);
     let relative = error(&pictures, &reference.green());
     let (mean, expected) = (mean_over(&pictures, |_, _| true), reference.mean());
