@@ -218,6 +218,12 @@ fn figures(_: &mut Criterion) {
     let reference =
         shoot("integrator: Path, caustics: Photons, photons: (radius: 2), seed: 9", size, 512);
     println!("reference: {:.1} CPU s", reference.seconds);
+    let small = quartered(&reference.pixels, 256);
+    for samples in [32, 128, 512] {
+        let shot = shoot("integrator: Sppm", (64, 64), samples);
+        let error = 100.0 * luminance_rmse(&shot.pixels, &small);
+        println!("64 × 64, Sppm, {samples} passes: {:.2} CPU s, RMSE {error:.2} %", shot.seconds);
+    }
     for settings in ["integrator: Sppm", "integrator: Path, caustics: Photons", "integrator: Path"]
     {
         for samples in [4, 8, 16, 32] {
@@ -240,6 +246,26 @@ fn figures(_: &mut Criterion) {
             println!();
         }
     }
+}
+
+/// The reference for a quarter of the size: the box filter of a large pixel is the mean of 16 small ones.
+fn quartered(pixels: &[Vec3], side: usize) -> Vec<Vec3> {
+    let small = side / 4;
+    let mean = |k: usize| {
+        let (x, y) = (k % small * 4, k / small * 4);
+        let sum: Vec3 = (0..16).map(|j| pixels[(y + j / 4) * side + x + j % 4]).sum();
+        sum / 16.0
+    };
+    (0..small * small).map(mean).collect()
+}
+
+/// Root of the mean squared error of luminance, over the mean luminance.
+fn luminance_rmse(image: &[Vec3], reference: &[Vec3]) -> f64 {
+    let luminance = |v: &Vec3| f64::from(kinora::color::luminance(*v));
+    let squares: f64 =
+        image.iter().zip(reference).map(|(a, b)| (luminance(a) - luminance(b)).powi(2)).sum();
+    let mean: f64 = reference.iter().map(luminance).sum();
+    (squares * reference.len() as f64).sqrt() / mean
 }
 
 criterion_group!(benches, map, figures);
