@@ -363,7 +363,17 @@ impl Simulation {
     fn table_bytes(&self) -> Vec<(&'static str, u64)> {
         let instances = self.world.resource::<Instances>().list.capacity() * size_of::<Instance>();
         let lights = self.world.resource::<LightTable>().memory();
-        vec![("instances", instances as u64), ("light table", lights as u64)]
+        let trees: usize =
+            self.world.resource::<MeshTrees>().list.iter().map(|tree| tree.memory()).sum();
+        let resting = self.world.resource::<RestingTree>().memory();
+        let top = self.world.resource::<TopLevel>().memory();
+        vec![
+            ("instances", instances as u64),
+            ("mesh trees", trees as u64),
+            ("tree of resting meshes", resting as u64),
+            ("top level", top as u64),
+            ("light table", lights as u64),
+        ]
     }
 
     /// The integrator which the settings ask for, and for `Auto` why it is taken.
@@ -453,9 +463,10 @@ mod tests {
         let frame = simulation.render_frame(0, &RenderControl::default()).expect("a camera");
         let FrameReport { system_seconds, stage_seconds, .. } = frame.report;
         let names: Vec<&str> = system_seconds.iter().map(|(name, _)| *name).collect();
-        let extract = ["camera", "surfaces", "emissions", "instances", "lights", "requirements"];
-        let build = ["mesh trees", "top level", "light table"];
-        assert_eq!(names, [&["poses"][..], &extract, &build].concat());
+        let step = ["poses", "deformation"];
+        let extract = ["camera", "surfaces", "emissions", "instances", "resting meshes", "lights"];
+        let build = ["tree of resting meshes", "mesh trees", "top level", "light table"];
+        assert_eq!(names, [&step[..], &extract, &["requirements"], &build].concat());
         let sum = |list: &[(&str, f64)]| list.iter().map(|(_, seconds)| seconds).sum::<f64>();
         assert!(sum(&system_seconds) > 0.0 && sum(&system_seconds) < sum(&stage_seconds[..3]));
     }

@@ -4,7 +4,7 @@
 use crate::clock::{median, pool, process_seconds, thread_seconds};
 use crate::meshes::RawMesh;
 use crate::rays::{compressed_tree, rates_by_quality};
-use crate::report::Report;
+use crate::report::{Report, section};
 use crate::{Options, mesh_of};
 use kinora::build::bvh::WideTree;
 use kinora::description::BvhQuality;
@@ -13,7 +13,7 @@ use std::hint::black_box;
 /// Builds hills of 10,000 to a million triangles.
 pub fn run(options: &Options, report: &mut Report) {
     let repetitions = if options.quick { 1 } else { 3 };
-    report.section("build: the tree of a mesh of hills and blobs");
+    section("build: the tree of a mesh of hills and blobs");
     let sizes = [
         (10_000, RawMesh::terrain(45, 8, 8)),
         (100_000, RawMesh::terrain(141, 81, 8)),

@@ -1,36 +1,45 @@
 //! Time on a processor, which other programs on the machine disturb less than time on the wall.
 
-use std::path::Path;
 use std::time::Instant;
 
-/// Nanoseconds on a processor come first in the `schedstat` of a thread (Linux,
-/// Documentation/scheduler/sched-stats).
-fn on_processor(task: &Path) -> Option<f64> {
-    let line = std::fs::read_to_string(task.join("schedstat")).ok()?;
-    Some(line.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
+/// Whose time is asked for.
+#[derive(Clone, Copy)]
+enum Whose {
+    Thread,
+    Process,
 }
 
-/// Seconds that all threads of this process which still run have spent.
-fn of_all_threads() -> Option<f64> {
-    let tasks = std::fs::read_dir("/proc/self/task").ok()?;
-    tasks.map(|task| on_processor(&task.ok()?.path())).sum()
+/// Seconds on a processor, by POSIX's `clock_gettime`; `None` where that is not asked.
+#[cfg(target_os = "linux")]
+fn spent(whose: Whose) -> Option<f64> {
+    use rustix::time::{ClockId, clock_gettime};
+    let time = clock_gettime(match whose {
+        Whose::Thread => ClockId::ThreadCPUTime,
+        Whose::Process => ClockId::ProcessCPUTime,
+    });
+    Some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
 }
 
-fn timed<T>(spent: impl Fn() -> Option<f64>, work: impl FnOnce() -> T) -> (f64, T) {
-    let (start, before) = (Instant::now(), spent());
+#[cfg(not(target_os = "linux"))]
+fn spent(_: Whose) -> Option<f64> {
+    None
+}
+
+fn timed<T>(whose: Whose, work: impl FnOnce() -> T) -> (f64, T) {
+    let (start, before) = (Instant::now(), spent(whose));
     let result = work();
     let wall = start.elapsed().as_secs_f64();
-    (before.zip(spent()).map_or(wall, |(a, b)| b - a), result)
+    (before.zip(spent(whose)).map_or(wall, |(a, b)| b - a), result)
 }
 
 /// CPU-seconds of this thread for a piece of work; of the clock where the system does not tell.
 pub fn thread_seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    timed(|| on_processor(Path::new("/proc/thread-self")), work)
+    timed(Whose::Thread, work)
 }
 
-/// CPU-seconds of all threads for a piece of work that ends none of them.
+/// CPU-seconds of all threads for a piece of work.
 pub fn process_seconds<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    timed(of_all_threads, work)
+    timed(Whose::Process, work)
 }
 
 /// CPU-seconds of the finished child processes of this one, to a hundredth: fields 16 and 17 of

@@ -14,7 +14,7 @@
 use crate::Options;
 use crate::clock::children_seconds;
 use crate::meshes::RawMesh;
-use crate::report::Report;
+use crate::report::{Report, section};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -241,7 +241,7 @@ fn converge(
 
 /// Measures three scenes; what goes wrong is told, and the others go on.
 pub fn run(options: &Options, report: &mut Report) {
-    report.section("convergence: CPU-seconds of the whole render to a relMSE of 1e-3, 256 × 256");
+    section("convergence: CPU-seconds of the whole render to a relMSE of 1e-3, 256 × 256");
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
     let cornell = || Ok(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.ron"));
     let scenes: [&dyn Fn() -> Result<PathBuf, Failure>; 3] =

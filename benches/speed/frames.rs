@@ -3,7 +3,7 @@
 use crate::Options;
 use crate::clock::{median, pool, process_seconds};
 use crate::common;
-use crate::report::Report;
+use crate::report::{Report, section};
 use bevy_ecs::prelude::*;
 use glam::DVec3;
 use kinora::frame::Simulation;
@@ -22,7 +22,7 @@ fn shift(simulation: &mut Simulation, count: usize, frame: u32) {
 /// Prepares frames over instances of one mesh: anew, and with none, one or all moved.
 pub fn run(options: &Options, report: &mut Report) {
     let repetitions = if options.quick { 7 } else { 21 };
-    report.section("frame: CPU-milliseconds before integration, by number of instances");
+    section("frame: CPU-milliseconds before integration, by number of instances");
     let mesh = common::triangles_at(&common::scattered(1000));
     for count in [100, 1000, 10_000] {
         let points = common::scattered(count);

@@ -9,7 +9,7 @@ use crate::clock::{median, thread_seconds};
 use crate::common;
 use crate::mesh_of;
 use crate::meshes::RawMesh;
-use crate::report::Report;
+use crate::report::{Report, section};
 use glam::Vec3;
 use kinora::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
 use kinora::extract::Instances;
@@ -44,7 +44,7 @@ fn time_per_ray(mut simulation: Simulation, rays: &[Ray], repetitions: usize) ->
 pub fn run(options: &Options, report: &mut Report) {
     let (count, repetitions) = if options.quick { (100_000, 3) } else { (400_000, 5) };
     let rays = common::rays(count);
-    report.section("growth: nanoseconds per ray at equal depth complexity");
+    section("growth: nanoseconds per ray at equal depth complexity");
     let mut rows = |what: &str, counts: [usize; 3], world: &dyn Fn(usize) -> Simulation| {
         let mut first = None;
         for n in counts {

@@ -7,7 +7,7 @@
 
 use crate::clock::{median, pool, process_seconds, thread_seconds};
 use crate::meshes::{RawMesh, Uniforms};
-use crate::report::Report;
+use crate::report::{Report, section};
 use crate::{Options, mesh_of};
 use glam::{DVec3, Vec3, Vec3A};
 use kinora::build::bvh::WideTree;
@@ -194,7 +194,7 @@ pub fn rates_by_quality(options: &Options, report: &mut Report) {
 /// Measures both scenes.
 pub fn run(options: &Options, report: &mut Report) {
     let (side, repetitions) = if options.quick { (512, 3) } else { (1024, 7) };
-    report.section("rays: Mrays per CPU-second through a million triangles");
+    section("rays: Mrays per CPU-second through a million triangles");
     for (name, raw, eye, target, light) in scenes() {
         let trees = Trees::build(mesh_of(raw));
         let primary = primary(side, eye, target);

@@ -3,16 +3,16 @@
 use serde_json::{Map, Value};
 use std::path::Path;
 
+/// A line above the rows of a section.
+pub fn section(title: &str) {
+    println!("\n{title}");
+}
+
 /// All numbers so far.
 #[derive(Default)]
 pub struct Report(Map<String, Value>);
 
 impl Report {
-    /// A line above the rows of a section.
-    pub fn section(&self, title: &str) {
-        println!("\n{title}");
-    }
-
     /// A row of the table: numbers under `prefix`, each with its own name and unit.
     pub fn row(&mut self, prefix: &str, values: &[(&str, f64, &str)]) {
         print!("  {prefix:34}");

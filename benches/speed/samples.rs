@@ -3,7 +3,7 @@
 use crate::Options;
 use crate::clock::{median, pool, process_seconds};
 use crate::common;
-use crate::report::Report;
+use crate::report::{Report, section};
 use kinora::frame::{RenderControl, Simulation};
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use std::time::Instant;
 pub fn run(options: &Options, report: &mut Report) {
     let (size, samples, repetitions) =
         if options.quick { ((64, 64), 16, 3) } else { ((128, 128), 32, 5) };
-    report.section("samples: millions of pixel samples per second of one and of two threads");
+    section("samples: millions of pixel samples per second of one and of two threads");
     let pools = [pool(1), pool(2)];
     let control = RenderControl::default();
     // In frame 12 the ball is in the air and the knife in the middle of the picture.

@@ -22,7 +22,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(TreeMemory::default());
     let trees = (
         bvh::join_resting_meshes,
-        stamp("resting meshes"),
+        stamp("tree of resting meshes"),
         bvh::rebuild_mesh_trees,
         stamp("mesh trees"),
         bvh::rebuild_top_level,

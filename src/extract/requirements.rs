@@ -75,7 +75,7 @@ impl Census {
 
 /// Writes [`Requirements`] when something that they follow from changed and they are different from
 /// before. Objects are counted anew only when there are others or their materials changed.
-#[expect(clippy::too_many_arguments, reason = "the signature lists what they follow from")]
+#[expect(clippy::too_many_arguments, reason = "the signature lists what the table depends on")]
 pub fn derive_requirements(
     instances: Res<Instances>,
     meshes: Res<Meshes>,

@@ -57,6 +57,7 @@ impl Moves<'_, '_> {
 pub struct Uses(EntityHashMap<u32>);
 
 /// Writes [`RestingMeshes`] when it is different from before.
+#[expect(clippy::too_many_arguments, reason = "the signature lists what the table depends on")]
 pub fn extract_resting_meshes(
     meshes: Res<Meshes>,
     instances: Res<Instances>,

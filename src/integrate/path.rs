@@ -84,6 +84,8 @@ struct Path<'a> {
     arrival: Arrival,
     first_hit: Option<FirstHit>,
     inside: u32,
+    /// Whether a light was drawn already.
+    lit: bool,
     /// Surface interactions.
     depth: u32,
     /// Surfaces met: those which let the ray pass count only here.
@@ -97,7 +99,7 @@ struct Path<'a> {
     boost: f32,
 }
 
-impl<'a> Path<'a> {
+impl Path<'_> {
     fn new(camera_ray: &CameraRay) -> Self {
         Self {
             ray: camera_ray.ray,
@@ -107,6 +109,7 @@ impl<'a> Path<'a> {
             arrival: Arrival::Sure,
             first_hit: None,
             inside: NOTHING,
+            lit: false,
             depth: 0,
             met: 0,
             departure: None,
@@ -244,23 +247,38 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
                 path.land(&surface, wo, &bsdf);
             }
             let vertex = Vertex::new(surface, wo, bsdf);
-            let receiver = vertex.receiver();
+            let mut receiver = vertex.receiver();
             let (to_scatter, on_light) =
                 sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
             if vertex.bsdf.has_non_delta() {
-                let choose = if self.scene.lights.has_choice() {
+                let lights = &self.scene.lights;
+                let choose = if lights.has_choice() {
                     sampler.one_fine(dimensions + dimension::LIGHT)
                 } else {
                     0.0
                 };
-                let (wi, distance, light) =
-                    self.direct(&vertex, &receiver, choose, on_light, path.ray.time, counters);
-                let light = if ABSORPTION && light != Rgb::ZERO {
-                    let medium = self.medium_towards(wi, &vertex, instance.material, path.inside);
-                    light * self.transmittance(medium, distance)
-                } else {
-                    light
+                let mut draw = |receiver: &Receiver, choose: f64, on_light: Vec2| {
+                    let (wi, distance, light) =
+                        self.direct(&vertex, receiver, choose, on_light, path.ray.time, counters);
+                    if ABSORPTION && light != Rgb::ZERO {
+                        let material = instance.material;
+                        let medium = self.medium_towards(wi, &vertex, material, path.inside);
+                        light * self.transmittance(medium, distance)
+                    } else {
+                        light
+                    }
                 };
+                // Where a path is lit first its noise counts most: it draws from the lights at a
+                // place and from the distant ones, later from either.
+                receiver.draws_both = !path.lit && lights.has_both_groups();
+                let light = if receiver.draws_both {
+                    let distant = sampler.two(dimensions + dimension::DISTANT_LIGHT_POINT);
+                    draw(&receiver, 0.5 * choose, distant)
+                        + draw(&receiver, 0.5 + 0.5 * choose, on_light)
+                } else {
+                    draw(&receiver, choose, on_light)
+                };
+                path.lit = true;
                 path.radiance += self.limited(path.throughput * light, path.depth);
             }
             let Some((wi, sample)) = vertex.scatter(lobe, to_scatter) else {

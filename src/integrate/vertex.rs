@@ -33,7 +33,7 @@ impl<'a> Vertex<'a> {
         let SurfacePoint { p, p_error, ng, ns, .. } = self.surface;
         let facing = if self.wo.dot(ns) < 0.0 { -ns } else { ns };
         let horizon = (!self.bsdf.transmits()).then_some(facing);
-        Receiver { p, p_error, ng, facing, horizon }
+        Receiver { p, p_error, ng, facing, horizon, draws_both: false }
     }
 
     /// Whether `wi` leaves by the side on which the BSDF placed it.

@@ -38,6 +38,8 @@ pub mod dimension {
     pub const DIRECTION_AND_LIGHT_POINT: u32 = 1;
     /// Which light (1).
     pub const LIGHT: u32 = 5;
+    /// Point on a distant light (2) where one is drawn beside another; beyond all vertices.
+    pub const DISTANT_LIGHT_POINT: u32 = 1 << 31;
     /// Russian roulette, or passing through a hole (1).
     pub const ROULETTE: u32 = 6;
 }

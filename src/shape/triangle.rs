@@ -22,7 +22,7 @@ impl TriangleTest {
     pub fn new(ray: &LocalRay) -> Self {
         let size = ray.d.abs();
         // Without branches, which the directions of bounced rays would mislead.
-        let x_longest = (size.x > size.y) & (size.x > size.z);
+        let x_longest = size.x > size.y.max(size.z);
         let z = usize::from(!x_longest) * (2 - usize::from(size.y > size.z));
         let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
         let d = ray.d.to_array();

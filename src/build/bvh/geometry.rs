@@ -48,15 +48,14 @@ impl SceneGeometry<'_> {
         let mut visit = |index: u32, t_max: f64| {
             // Equal distances are let through, so that the tie is decided by `precedes`.
             let end = t_max.next_up();
-            let hit = match (index, &self.top.joined) {
-                (RESTING, Some(joined)) => hit_joined(joined, ray, end),
-                _ => {
-                    let instance = &self.instances[index as usize];
-                    if from_camera && instance.hidden_from_camera {
-                        return t_max;
-                    }
-                    self.hit_instance(index, instance, ray, end)
+            let hit = if let (RESTING, Some(joined)) = (index, &self.top.joined) {
+                hit_joined(joined, ray, end)
+            } else {
+                let instance = &self.instances[index as usize];
+                if from_camera && instance.hidden_from_camera {
+                    return t_max;
                 }
+                self.hit_instance(index, instance, ray, end)
             };
             if let Some(hit) = hit
                 && best.is_none_or(|best| hit.precedes(&best))
@@ -78,11 +77,10 @@ impl SceneGeometry<'_> {
     pub fn occluded(&self, ray: &Ray, t_max: f64) -> bool {
         let mut blocked = false;
         let mut visit = |index: u32, t_max: f64| {
-            blocked = match (index, &self.top.joined) {
-                (RESTING, Some(joined)) => {
-                    joined.tree.any_hit(&shifted(ray, joined), ray.time, t_max)
-                }
-                _ => self.blocks(&self.instances[index as usize], ray, t_max),
+            blocked = if let (RESTING, Some(joined)) = (index, &self.top.joined) {
+                joined.tree.any_hit(&shifted(ray, joined), ray.time, t_max)
+            } else {
+                self.blocks(&self.instances[index as usize], ray, t_max)
             };
             if blocked { 0.0 } else { t_max }
         };

@@ -54,7 +54,7 @@ impl RestingTree {
             let mesh = &meshes[member.mesh as usize];
             let base = shared.positions.len() as u32;
             starts.push((shared.triangles.len() as u32, member.instance));
-            shared.positions.extend(corners(member, mesh, origin).map(|p| p.as_vec3()));
+            shared.positions.extend(corners(member, mesh, origin).map(DVec3::as_vec3));
             shared.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + base)));
         }
         let tree = Some(Arc::new(MeshTree::build(Arc::new(shared), quality)));
@@ -65,6 +65,11 @@ impl RestingTree {
     pub fn first_triangle(&self, instance: u32) -> Option<u32> {
         let k = self.members.binary_search_by_key(&instance, |member| member.1).ok()?;
         Some(self.members[k].0)
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        self.tree.as_ref().map_or(0, |tree| tree.memory())
     }
 
     /// Instance and triangle of its mesh of a triangle of the shared tree.

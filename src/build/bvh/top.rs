@@ -125,6 +125,11 @@ impl TopLevel {
         !self.tree.is_worn()
     }
 
+    /// Bytes held, without the tree of resting meshes.
+    pub fn memory(&self) -> usize {
+        self.tree.memory() + (self.always.capacity() + self.boxes.capacity()) * size_of::<u32>()
+    }
+
     /// The box around all instances which have bounds.
     pub fn bounds(&self) -> Aabb {
         self.bounds

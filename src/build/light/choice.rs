@@ -80,6 +80,13 @@ impl LightChoice {
         }
     }
 
+    /// Whether there are lights in both groups, so that either is drawn with probability ½: by a number
+    /// below ½ a distant light, by any other one at a place.
+    #[inline]
+    pub fn has_both_groups(&self) -> bool {
+        self.far_share > 0.0 && self.far_share < 1.0
+    }
+
     /// Bytes that the tree over lights at a place holds.
     pub fn memory(&self) -> usize {
         match &self.near {

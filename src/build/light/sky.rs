@@ -82,7 +82,11 @@ impl SkyLight {
         render_from_light: &DAffine3,
         materials: &MaterialTable,
     ) -> Rgb {
-        self.radiance_local(to_light(render_from_light, wi), materials)
+        match self.radiance {
+            // The same everywhere: where it comes from is not asked.
+            Value::Constant(radiance) => radiance * self.scale,
+            Value::Texture(_) => self.radiance_local(to_light(render_from_light, wi), materials),
+        }
     }
 
     /// Draws a direction towards the sky and its density per unit solid angle. `normal` is where the

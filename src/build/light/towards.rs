@@ -32,6 +32,17 @@ pub struct Receiver {
     pub facing: Vec3,
     /// The same normal if light from behind it cannot matter; `None` where the surface transmits.
     pub horizon: Option<Vec3>,
+    /// Whether it draws once from each of the two groups of lights, those at a place and those
+    /// infinitely far away, instead of once from either.
+    pub draws_both: bool,
+}
+
+impl Receiver {
+    /// How many times as many lights it draws.
+    #[inline]
+    fn draws(&self) -> f32 {
+        if self.draws_both { 2.0 } else { 1.0 }
+    }
 }
 
 /// Where a shadow ray ends.
@@ -160,7 +171,14 @@ impl Lights<'_> {
         self.table.emitters.len() > 1
     }
 
-    /// Draws a light and a direction towards it. `None` when the draw carries no light.
+    /// Whether there are lights both at a place and infinitely far away.
+    #[inline]
+    pub fn has_both_groups(&self) -> bool {
+        self.table.choice.has_both_groups()
+    }
+
+    /// Draws a light and a direction towards it. For a receiver which draws from both groups a `choose`
+    /// below ½ draws from the lights infinitely far away, any other from those at a place. `None` when the draw carries no light.
     pub fn sample(&self, from: &Receiver, time: f32, choose: f64, u: Vec2) -> Option<LightSample> {
         let (index, probability) =
             self.table.choice.sample(from.p.as_vec3(), from.horizon, choose)?;
@@ -171,7 +189,7 @@ impl Lights<'_> {
             }
             Emitter::Punctual(index) => self.sample_punctual(index, from, time, u),
         }?;
-        sample.pdf *= probability;
+        sample.pdf *= probability * from.draws();
         (sample.pdf > 0.0 && sample.pdf.is_finite() && sample.radiance != Rgb::ZERO)
             .then_some(sample)
     }
@@ -209,7 +227,7 @@ impl Lights<'_> {
         };
         if let Some(pdf) = prepared {
             let choice = self.table.choice.probability(first, from.p.as_vec3(), from.horizon);
-            return choice * pdf as f32;
+            return choice * from.draws() * pdf as f32;
         }
         let object = &self.geometry.instances[instance as usize];
         let map = object.motion.at(time);
@@ -232,7 +250,8 @@ impl Lights<'_> {
                 triangle_pdf(from.p, self.triangle(instance, primitive, time, &map), q),
             ),
         };
-        self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon) * pdf as f32
+        let choice = self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon);
+        choice * from.draws() * pdf as f32
     }
 
     /// Radiance from the lights infinitely far away in the unit direction `wi`, each with the density
@@ -247,7 +266,8 @@ impl Lights<'_> {
             let light = &self.punctual[index];
             let probability = from.map_or(0.0, |from| {
                 let emitter = self.table.of_punctual[index];
-                self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon)
+                let choice = self.table.choice.probability(emitter, from.p.as_vec3(), from.horizon);
+                choice * from.draws()
             });
             if let Some(sky) = &self.table.skies[index] {
                 let map = light.motion.at(time);

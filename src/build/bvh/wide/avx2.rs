@@ -161,18 +161,22 @@ fn sheared(ray: &TriangleLanes, x: __m256d, y: __m256d, z: __m256d) -> Sheared {
 /// Moves corners to the origin of the ray and shears them.
 #[inline(always)]
 fn seen(ray: &TriangleLanes, corner: &[[f32; BLOCK]; 3]) -> Sheared {
-    let [kx, ky, kz] = ray.axes;
-    let z = from_origin(&corner[kz], ray.o[2]);
-    let (x, y) = (from_origin(&corner[kx], ray.o[0]), from_origin(&corner[ky], ray.o[1]));
+    // SAFETY: the axes of a `TriangleTest` are 0, 1 and 2 in some order.
+    let [x, y, z] = unsafe { ray.axes.map(|axis| corner.get_unchecked(axis)) };
+    let (x, y, z) = (from_origin(x, ray.o[0]), from_origin(y, ray.o[1]), from_origin(z, ray.o[2]));
     sheared(ray, x, y, z)
 }
 
 /// The same for corners in `f64`.
 #[inline(always)]
 fn wide_seen(ray: &TriangleLanes, corner: &[[f64; BLOCK]; 3]) -> Sheared {
-    let [kx, ky, kz] = ray.axes;
-    let z = wide_from_origin(&corner[kz], ray.o[2]);
-    let (x, y) = (wide_from_origin(&corner[kx], ray.o[0]), wide_from_origin(&corner[ky], ray.o[1]));
+    // SAFETY: the axes of a `TriangleTest` are 0, 1 and 2 in some order.
+    let [x, y, z] = unsafe { ray.axes.map(|axis| corner.get_unchecked(axis)) };
+    let (x, y, z) = (
+        wide_from_origin(x, ray.o[0]),
+        wide_from_origin(y, ray.o[1]),
+        wide_from_origin(z, ray.o[2]),
+    );
     sheared(ray, x, y, z)
 }
 
@@ -255,9 +259,11 @@ impl Lanes for Vectors {
             let mut near = _mm256_setzero_ps();
             let mut far = _mm256_set1_ps(end);
             for axis in 0..3 {
+                // One of 2·axis and 2·axis + 1: `BoxRay` makes no others.
                 let plane = ray.near_planes[axis];
-                let enter = _mm256_load_ps(node.planes[plane].as_ptr());
-                let leave = _mm256_load_ps(node.planes[plane ^ 1].as_ptr());
+                debug_assert!(plane / 2 == axis);
+                let enter = _mm256_load_ps(node.planes.get_unchecked(plane).as_ptr());
+                let leave = _mm256_load_ps(node.planes.get_unchecked(plane ^ 1).as_ptr());
                 // Minimum and maximum return their second operand where one is NaN.
                 let a = _mm256_mul_ps(
                     _mm256_sub_ps(ray.near_origin[axis], enter),

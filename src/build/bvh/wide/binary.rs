@@ -189,10 +189,12 @@ fn subdivide(
     if count <= LEAF {
         return 1;
     }
-    let split = match count {
-        _ if depth >= DEEPEST_SAH => None,
-        _ if count >= many => best_split::<MANY_BINS>(references, summary),
-        _ => best_split::<FEW_BINS>(references, summary),
+    let split = if depth >= DEEPEST_SAH {
+        None
+    } else if count >= many {
+        best_split::<MANY_BINS>(references, summary)
+    } else {
+        best_split::<FEW_BINS>(references, summary)
     };
     let (middle, left_summary, right_summary) = if let Some(split) = split {
         split.apply(references)

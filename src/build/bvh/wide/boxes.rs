@@ -3,6 +3,7 @@
 use super::Instructions;
 use super::node::{Child, Node, WIDTH};
 use super::ray::BoxRay;
+use super::stack::Stack;
 use super::traverse::{Distances, Lanes, Portable, child_of, distance_of, key, take_lane};
 use crate::build::bvh::Bvh;
 use crate::math::Aabb;
@@ -61,6 +62,13 @@ impl BoxTree {
         }
         tree.area_built = tree.area;
         tree
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+            + (self.parents.capacity() + self.places.capacity()) * size_of::<Place>()
+            + self.names.capacity() * size_of::<u32>()
     }
 
     /// Number of boxes.
@@ -157,7 +165,7 @@ impl BoxTree {
                 avx2.visit_boxes::<STACK>(self, &prepared, t_max, visit);
             }
             (Instructions::Portable, _) => {
-                visit_boxes::<Portable, STACK>(self, &prepared, t_max, visit)
+                visit_boxes::<Portable, STACK>(self, &prepared, t_max, visit);
             }
         }
     }
@@ -173,8 +181,7 @@ pub(super) fn visit_boxes<L: Lanes, const STACK: usize>(
 ) {
     let boxes = L::prepare_boxes(prepared);
     let mut end = prepared.distance(t_max);
-    let mut stack = [0_u64; STACK];
-    let mut depth = 0;
+    let mut stack = Stack::<u64, STACK>::new();
     let mut distances = Distances::default();
     let mut current = Child::node(0);
     loop {
@@ -189,26 +196,16 @@ pub(super) fn visit_boxes<L: Lanes, const STACK: usize>(
         } else {
             let node = &tree.nodes[current.index()];
             let mut mask = L::enter(&boxes, node, end, &mut distances);
-            let bottom = depth;
+            let bottom = stack.depth();
             while mask != 0 {
                 let lane = take_lane(&mut mask);
-                let entry = key(distances.0[lane], node.children[lane]);
-                let mut place = depth;
-                while place > bottom && stack[place - 1] < entry {
-                    stack[place] = stack[place - 1];
-                    place -= 1;
-                }
-                stack[place] = entry;
-                depth += 1;
+                stack.insert(bottom, key(distances.0[lane], node.children[lane]));
             }
         }
         loop {
-            if depth == 0 {
-                return;
-            }
-            depth -= 1;
-            if distance_of(stack[depth]) <= end {
-                current = child_of(stack[depth]);
+            let Some(entry) = stack.pop() else { return };
+            if distance_of(entry) <= end {
+                current = child_of(entry);
                 break;
             }
         }

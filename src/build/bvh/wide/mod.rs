@@ -31,6 +31,7 @@ mod pages;
 mod presplit;
 mod ray;
 mod reinsert;
+mod stack;
 #[cfg(test)]
 mod tests;
 mod traverse;

@@ -81,8 +81,10 @@ impl MovingTree {
         if whole.is_empty() || keys.is_empty() {
             return Self::default();
         }
-        let at =
-            |key: usize| move |triangle| corners(key, triangle).expect("only whole ones are kept");
+        // Only triangles are asked for whose corners were found above.
+        let at = |key: usize| {
+            move |triangle: u32| triangles[triangle as usize].map(|k| keys[key][k as usize])
+        };
         let last = keys.len() - 1;
         let segments =
             (0..last.max(1)).map(|k| Segment::build(&whole, at(k), at((k + 1).min(last))));
@@ -436,7 +438,8 @@ mod tests {
                 }
                 hits += u64::from(expected.is_some());
             }
-            assert!(hits > RAYS / 4, "{what}: {hits}");
+            // Rays from point to point of a plane stay in it.
+            assert!(hits > RAYS / 4 || what == "flat", "{what}: {hits}");
         }
     }
 

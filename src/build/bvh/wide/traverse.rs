@@ -10,6 +10,7 @@
 
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
 use super::ray::BoxRay;
+use super::stack::Stack;
 use crate::math::Aabb;
 use crate::shape::{LocalRay, TriangleTest};
 use glam::{DVec2, DVec3};
@@ -214,6 +215,7 @@ fn is_met(ray: &LocalRay, prepared: Option<&BoxRay>, bounds: &Aabb, t: f64) -> b
 
 /// Lowers `best` and `t_max` to the nearest hit in a leaf.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "the state of a traversal, inlined into it")]
 fn nearest_of_leaf<L: Lanes, N: Nodes>(
     tree: &N,
     leaf: Child,
@@ -222,10 +224,10 @@ fn nearest_of_leaf<L: Lanes, N: Nodes>(
     triangles: &L::Triangles,
     t_max: &mut f64,
     best: &mut Option<TriangleHit>,
+    hits: &mut BlockHits,
 ) {
-    let mut hits = BlockHits::default();
     for block in leaf.blocks() {
-        let mut mask = tree.hit::<L>(block, triangles, *t_max, &mut hits);
+        let mut mask = tree.hit::<L>(block, triangles, *t_max, hits);
         while mask != 0 {
             let lane = take_lane(&mut mask) % BLOCK;
             let (t, triangle) = (hits.t[lane], tree.triangle(block, lane));
@@ -250,10 +252,10 @@ fn leaf_blocks<L: Lanes, N: Nodes>(
     prepared: Option<&BoxRay>,
     triangles: &L::Triangles,
     t_max: f64,
+    hits: &mut BlockHits,
 ) -> bool {
-    let mut hits = BlockHits::default();
     for block in leaf.blocks() {
-        let mut mask = tree.hit::<L>(block, triangles, t_max, &mut hits);
+        let mut mask = tree.hit::<L>(block, triangles, t_max, hits);
         while mask != 0 {
             let lane = take_lane(&mut mask) % BLOCK;
             if is_met(ray, prepared, &tree.triangle_bounds(block, lane), hits.t[lane]) {
@@ -289,15 +291,18 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
 ) -> Option<TriangleHit> {
     let triangles = L::prepare_triangles(&TriangleTest::new(ray));
     let mut best = None;
-    if tree.root().is_leaf() {
-        nearest_of_leaf::<L, N>(tree, tree.root(), ray, None, &triangles, &mut t_max, &mut best);
+    let mut hits = BlockHits::default();
+    let root = tree.root();
+    if root.is_leaf() {
+        nearest_of_leaf::<L, N>(
+            tree, root, ray, None, &triangles, &mut t_max, &mut best, &mut hits,
+        );
         return best;
     }
     let prepared = BoxRay::new(ray)?;
     let boxes = L::prepare_boxes(&prepared);
     let mut end = prepared.distance(t_max);
-    let mut stack = [0_u64; STACK];
-    let mut depth = 0;
+    let mut stack = Stack::<Key, STACK>::new();
     let mut distances = Distances::default();
     let mut current = tree.root();
     let mut scratch = Node::EMPTY;
@@ -312,6 +317,7 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
                 &triangles,
                 &mut t_max,
                 &mut best,
+                &mut hits,
             );
             if t_max < before {
                 end = prepared.distance(t_max);
@@ -328,8 +334,7 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
                 let b = take_child::<L, N>(tree, node, &distances, &mut mask);
                 let (a, b) = (a.min(b), a.max(b));
                 if mask == 0 {
-                    stack[depth] = b;
-                    depth += 1;
+                    stack.push(b);
                     current = child_of(a);
                     continue;
                 }
@@ -337,39 +342,24 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
                 let (a, c) = (a.min(c), a.max(c));
                 let (b, c) = (b.min(c), b.max(c));
                 if mask == 0 {
-                    stack[depth] = c;
-                    stack[depth + 1] = b;
-                    depth += 2;
+                    stack.push(c);
+                    stack.push(b);
                     current = child_of(a);
                     continue;
                 }
-                let bottom = depth;
+                let bottom = stack.depth();
                 for key in [c, b, a] {
-                    stack[depth] = key;
-                    depth += 1;
+                    stack.push(key);
                 }
                 while mask != 0 {
-                    let key = take_child::<L, N>(tree, node, &distances, &mut mask);
-                    let mut place = depth;
-                    while place > bottom && stack[place - 1] < key {
-                        stack[place] = stack[place - 1];
-                        place -= 1;
-                    }
-                    stack[place] = key;
-                    depth += 1;
+                    stack.insert(bottom, take_child::<L, N>(tree, node, &distances, &mut mask));
                 }
-                depth -= 1;
-                current = child_of(stack[depth]);
-                continue;
             }
         }
         loop {
-            if depth == 0 {
-                return best;
-            }
-            depth -= 1;
-            if distance_of(stack[depth]) <= end {
-                current = child_of(stack[depth]);
+            let Some(key) = stack.pop() else { return best };
+            if distance_of(key) <= end {
+                current = child_of(key);
                 break;
             }
         }
@@ -386,20 +376,21 @@ pub(super) fn any_hit<L: Lanes, N: Nodes, const STACK: usize>(
     t_max: f64,
 ) -> bool {
     let triangles = L::prepare_triangles(&TriangleTest::new(ray));
+    let mut hits = BlockHits::default();
     if tree.root().is_leaf() {
-        return leaf_blocks::<L, N>(tree, tree.root(), ray, None, &triangles, t_max);
+        return leaf_blocks::<L, N>(tree, tree.root(), ray, None, &triangles, t_max, &mut hits);
     }
     let Some(prepared) = BoxRay::new(ray) else { return false };
     let boxes = L::prepare_boxes(&prepared);
     let end = prepared.distance(t_max);
-    let mut stack = [Child::NOTHING; STACK];
-    let mut depth = 0;
+    let mut stack = Stack::<u32, STACK>::new();
     let mut distances = Distances::default();
     let mut current = tree.root();
     let mut scratch = Node::EMPTY;
-    loop {
+    'next: loop {
         if current.is_leaf() {
-            if leaf_blocks::<L, N>(tree, current, ray, Some(&prepared), &triangles, t_max) {
+            let ready = Some(&prepared);
+            if leaf_blocks::<L, N>(tree, current, ray, ready, &triangles, t_max, &mut hits) {
                 return true;
             }
         } else {
@@ -408,14 +399,14 @@ pub(super) fn any_hit<L: Lanes, N: Nodes, const STACK: usize>(
             while mask != 0 {
                 let child = node.children[take_lane(&mut mask)];
                 L::prefetch(tree.place(child));
-                stack[depth] = child;
-                depth += 1;
+                if mask == 0 {
+                    current = child;
+                    continue 'next;
+                }
+                stack.push(child.0);
             }
         }
-        if depth == 0 {
-            return false;
-        }
-        depth -= 1;
-        current = stack[depth];
+        let Some(child) = stack.pop() else { return false };
+        current = Child(child);
     }
 }
