@@ -239,3 +239,68 @@ fn frames_differ_by_the_stated_noise_where_nothing_changes() {
         }
     }
 }
+
+/// Oracle: in a closed cavity of albedo ½ and emission ½ the radiance is 1 in every direction, and a glass ball
+/// in it cannot be seen, whichever light comes from photons.
+#[test]
+fn a_furnace_with_a_glass_ball_reads_one() {
+    let text = r#"(
+        render: (filter: Box(), SETTINGS),
+        materials: {"wall": Diffuse(albedo: 0.5), "glass": Dielectric(ior: 1.5)},
+        entities: {
+            "camera": (transform: (translation: (0.3, -0.2, 1.4), look_at: (0, 0, 0)), camera: (fov: 70)),
+            "cavity": (shape: Sphere(radius: 2), material: "wall", two_sided: true, emission: Radiance((0.5, 0.5, 0.5))),
+            "ball": (transform: (translation: (0, -0.1, 0)), shape: Sphere(radius: 0.5), material: "glass"),
+        })"#;
+    for settings in [
+        METHODS[0],
+        METHODS[1],
+        "integrator: Sppm, photons: (direct: Photons, per_pass: Some(16384))",
+        "integrator: PhotonMap, final_gather: 4, photons: (per_pass: Some(65536))",
+    ] {
+        let pictures = seeds(&described(text, settings, (12, 12), 16), 4);
+        for (what, centre) in [("all", false), ("the ball", true)] {
+            let chosen = |x: u32, y: u32| !centre || ((4..8).contains(&x) && (4..8).contains(&y));
+            let mean = mean_over(&pictures, chosen);
+            println!("{settings}, {what}: {mean:?}");
+            assert!(
+                (mean.mean - 1.0).abs() < 4.0 * mean.error + 2e-3,
+                "{settings}, {what}: {mean:?}"
+            );
+            assert!(mean.error < 0.03, "{settings}, {what}: {mean:?}");
+        }
+    }
+}
+
+/// A coarse ball with the normals of a sphere over a floor: photons arrive by its facets and are scattered by
+/// its shading normals. Reference: path tracing. Without the corrections of Veach's chapter 5 the ball shows
+/// its facets, and what it sends to the floor is off.
+#[test]
+fn shading_normals_look_the_same_to_photons() {
+    let ball = common::mesh_text("ball", &common::icosphere(0, true));
+    let text = format!(
+        r#"(
+        render: (filter: Box(), SETTINGS),
+        materials: {{"white": Diffuse(albedo: 0.8)}}, meshes: {{ {ball} }},
+        entities: {{
+            "camera": (transform: (translation: (0, 1.2, 4), look_at: (0, 0, 0)), camera: (fov: 50)),
+            "ball": (shape: Mesh("ball"), material: "white"),
+            "floor": (transform: (translation: (0, -1, 0), rotation: (-90, 0, 0)), shape: Rectangle(size: (6, 6)), material: "white"),
+            "lamp": (transform: (translation: (2, 3, 1)), light: Point(intensity: Some((10, 10, 10)))),
+        }})"#
+    );
+    let reference = render_description(&described(&text, "integrator: Path", (16, 12), 1024), 0);
+    let photons =
+        "integrator: Sppm, photons: (direct: Photons, per_pass: Some(65536), radius: 0.2)";
+    let pictures = seeds(&described(&text, photons, (16, 12), 16), 4);
+    let relative = error(&pictures, &reference.green());
+    let (mean, expected) = (mean_over(&pictures, |_, _| true), reference.mean());
+    println!("{mean:?} {expected:?} {relative}");
+    let difference = (mean.mean - expected.mean).abs();
+    assert!(
+        difference < 4.0 * mean.error.hypot(expected.error) + 0.015 * expected.mean,
+        "{mean:?} {expected:?}"
+    );
+    // The rims of shadow are blurred; facets would be everywhere.
+    assert!(relative < 0.02, "{relative}");
+}

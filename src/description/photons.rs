@@ -40,7 +40,8 @@ pub enum Kernel {
 #[serde(deny_unknown_fields, default)]
 pub struct PhotonSettings {
     /// Photons emitted in each pass; `None` is as many as there are pixels, rounded up to a power of
-    /// two and at least 4096. Trades time and memory for noise.
+    /// two and at least 4096, and an eighth of that where they are aimed at what casts caustics, since
+    /// so many more of them arrive. Trades time and memory for noise.
     pub per_pass: Option<u32>,
     /// How slowly the radius shrinks, in `(0, 1)`: the noise falls with `passes^−alpha`, the blur with
     /// `passes^(alpha − 1)`. Both together fall fastest at 2/3.
@@ -86,13 +87,14 @@ impl PhotonSettings {
         self.min_roughness * self.min_roughness
     }
 
-    /// Photons of a pass for a picture of this size.
-    pub fn emitted(&self, size: (u32, u32)) -> u32 {
+    /// Photons of a pass for a picture of this size; `aimed` says whether all go to what casts caustics.
+    pub fn emitted(&self, size: (u32, u32), aimed: bool) -> u32 {
         /// Fewer than this leave more work to starting a pass than to its photons.
         const LEAST: u64 = 1 << 12;
         /// As many as are traced in about ten seconds by one core.
         const MOST: u64 = 1 << 22;
         let pixels = u64::from(size.0) * u64::from(size.1);
-        self.per_pass.unwrap_or(pixels.next_power_of_two().clamp(LEAST, MOST) as u32)
+        let photons = pixels.next_power_of_two() / if aimed { 8 } else { 1 };
+        self.per_pass.unwrap_or(photons.clamp(LEAST, MOST) as u32)
     }
 }

@@ -141,8 +141,9 @@ fn count_lights(instances: &Instances, lights: &PunctualLights) -> LightCounts {
     let mut counts = LightCounts::default();
     for light in &lights.0 {
         match light.light {
-            Light::Point { .. } | Light::Spot { .. } => counts.points += 1,
-            Light::Directional { angle: 0.0, .. } => counts.points += 1,
+            Light::Point { .. } | Light::Spot { .. } | Light::Directional { angle: 0.0, .. } => {
+                counts.points += 1;
+            }
             Light::Directional { angle, .. } if angle < SMALL_ANGLE_DEG => counts.small += 1,
             Light::Directional { .. } | Light::Sky { .. } => {}
         }

@@ -35,7 +35,7 @@ use glam::{Vec2, Vec3};
 
 /// How much wider photons are gathered at points which the camera sees by a diffuse bounce: the
 /// bounce blurs what is found there anyway.
-const BEHIND_DIFFUSE: f32 = 4.0;
+const BEHIND_DIFFUSE: f32 = 2.0;
 /// Units in the last place of a position below which a disk cannot be resolved.
 const LEAST_RADIUS_ULPS: f32 = 32.0;
 

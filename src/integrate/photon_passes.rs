@@ -235,9 +235,8 @@ impl<'a> Setting<'a> {
             Method::Sppm if self.job.settings.photons.direct == DirectLight::Photons => {
                 Some(Keep::All)
             }
-            Method::Sppm => Some(Keep::Indirect),
             Method::PhotonMap if self.job.settings.final_gather > 0 => Some(Keep::All),
-            Method::PhotonMap => Some(Keep::Indirect),
+            Method::Sppm | Method::PhotonMap => Some(Keep::Indirect),
             Method::Path | Method::PathWithPhotons => None,
         }
     }
@@ -249,7 +248,8 @@ impl<'a> Setting<'a> {
     /// How many photons a pass emits: as many as asked for, unless the memory does not suffice.
     fn plan<const O: bool, const A: bool>(&self, scratch: &mut PhotonScratch) -> PhotonReport {
         let settings = self.job.settings;
-        let asked = settings.photons.emitted(settings.size);
+        let aimed = self.method == Method::PathWithPhotons && self.aim.is_some();
+        let asked = settings.photons.emitted(settings.size, aimed);
         let pilot =
             PhotonPass { emitted: PILOT.min(asked), ..self.photon_pass(u32::MAX, asked, 0.5) };
         let keeps = [self.global_keep(), self.has_caustic_map().then_some(Keep::Caustics)];

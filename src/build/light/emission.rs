@@ -190,12 +190,12 @@ impl Emission<'_> {
     fn punctual(&self, index: u32, reach: Option<BoundingSphere>) -> Option<EmittedPhoton> {
         let light = &self.lights.punctual[index as usize];
         match light.light {
-            Light::Point { .. } | Light::Spot { .. } => self.from_point(light),
-            Light::Directional { .. } | Light::Sky { .. } => self.from_afar(index, light, reach?),
+            Light::Point { .. } | Light::Spot { .. } => self.at_point(light),
+            Light::Directional { .. } | Light::Sky { .. } => self.far_away(index, light, reach?),
         }
     }
 
-    fn from_point(&self, light: &PunctualLight) -> Option<EmittedPhoton> {
+    fn at_point(&self, light: &PunctualLight) -> Option<EmittedPhoton> {
         let map = light.motion.at(self.time);
         let p = map.translation;
         let axis = axis_of(&map);
@@ -236,7 +236,7 @@ impl Emission<'_> {
     }
 
     /// From infinitely far away: a direction, then a point of the disk perpendicular to it.
-    fn from_afar(
+    fn far_away(
         &self,
         index: u32,
         light: &PunctualLight,

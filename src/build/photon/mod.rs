@@ -12,9 +12,9 @@
 
 mod kernel;
 mod map;
-mod photon;
+mod record;
 mod trace;
 
 pub use map::{PhotonMap, QueryPoint};
-pub use photon::Photon;
+pub use record::Photon;
 pub use trace::{Keep, PhotonCounters, PhotonPass, PhotonStore, PhotonTracer};

@@ -6,8 +6,8 @@
 //! Φ' = Φ·f*(ω_i → ω_o)·|cos θ_o| / (p·q),
 //! ```
 //!
-//! with the probability `q = min(1, max Φ'/max Φ)` (before the division by `q`) that the photon goes on, which keeps the
-//! powers even. Two things are different from a path which starts at the camera:
+//! where it goes on with the probability `q = min(1, max Φ'q/max Φ)`, which keeps the powers even. Two
+//! things are different from a path which starts at the camera:
 //!
 //! - refraction does not scale power by `η²` ([`TransportMode::Importance`]);
 //! - where shading and geometric normal differ the BSDF is not symmetric. The adjoint is
@@ -106,10 +106,10 @@ impl PhotonStore {
 
     /// Adds a photon at the end.
     pub fn push(&mut self, photon: Photon) {
-        if self.chunks.is_empty() {
-            self.chunks.push(Vec::new());
+        match self.chunks.last_mut() {
+            Some(chunk) => chunk.push(photon),
+            None => self.chunks.push(vec![photon]),
         }
-        self.chunks.last_mut().expect("there is one").push(photon);
     }
 
     /// How many.
