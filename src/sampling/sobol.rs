@@ -266,11 +266,9 @@ mod tests {
     #[test]
     fn tables_hold_the_third_and_fourth_sobol_dimensions() {
         for (table, first) in [(&THIRD, [1, 3, 3, 9, 29]), (&FOURTH, [1, 3, 1, 5, 31])] {
-            let mut k = 0;
-            for m in first {
+            for (k, m) in (0..).zip(first) {
                 let direction = (m as u32) << (31 - k);
                 assert_eq!(by_table(table, 1 << k).reverse_bits(), direction, "number {k}");
-                k += 1;
             }
             let (a, b) = (0x1234_5678_u32, 0x0f0f_3c3c);
             assert_eq!(by_table(table, a ^ b), by_table(table, a) ^ by_table(table, b));

@@ -231,7 +231,7 @@ mod tests {
     fn ray(k: u32) -> LocalRay {
         let s = Sampler::new(5, 1, (k, 0), 0);
         let o = s.two(0).extend(s.one(2)) * 2.0 - 0.5;
-        let d = if k % 3 == 0 { Vec3::Z } else { s.two(3).extend(s.one(5)) - 0.5 };
+        let d = if k.is_multiple_of(3) { Vec3::Z } else { s.two(3).extend(s.one(5)) - 0.5 };
         LocalRay { o: o.as_dvec3(), d: d.as_dvec3() }
     }
 
