@@ -121,7 +121,7 @@ fn map(c: &mut Criterion) {
                     let mut sum = 0.0;
                     for &(position, normal, radius) in &sized {
                         tree.gather(&QueryPoint { position, normal, radius }, |p, _| {
-                            sum += p.power.x
+                            sum += p.power.x;
                         });
                     }
                     sum
