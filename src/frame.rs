@@ -7,6 +7,7 @@ use crate::description::SceneDescription;
 use crate::extract::{ChosenIntegrator, Emissions, Instance, Instances, Surfaces, ViewCamera};
 use crate::film::{Film, FilmError};
 use crate::integrate::{IntegrateStatus, PhotonReport};
+use crate::shade::nesting::NestingFaults;
 use crate::world::{Camera, FrameClock, Settings};
 use crate::{build, extract, integrate, step};
 use bevy_ecs::prelude::*;
@@ -285,7 +286,12 @@ impl Simulation {
             truncated_paths: status.counters.truncated,
             photons: status.photons,
             integrator: self.integrator(),
-            warnings: self.warnings().into_iter().chain(status.warnings).collect(),
+            warnings: self
+                .warnings()
+                .into_iter()
+                .chain(status.warnings)
+                .chain(self.nesting_warnings(&status.counters.nesting))
+                .collect(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
         Ok(RenderedFrame { film, report, world_to_camera })
@@ -379,6 +385,32 @@ impl Simulation {
     /// The integrator which the settings ask for, and for `Auto` why it is taken.
     pub fn integrator(&self) -> String {
         self.world.resource::<ChosenIntegrator>().description()
+    }
+
+    /// Where rays found solids nested in a way that cannot be.
+    fn nesting_warnings(&self, faults: &NestingFaults) -> Vec<String> {
+        let instances = self.world.resource::<Instances>();
+        let name = |index: u32| {
+            let name = instances.entity(index).and_then(|entity| self.world.get::<Name>(entity));
+            name.map_or("", |name| name.as_str())
+        };
+        let mut warnings = Vec::new();
+        if let Some((a, b)) = faults.pair {
+            let (count, a) = (faults.count, name(a));
+            let within = match name(b) {
+                b if a == b => "in air".to_owned(),
+                b => format!("in `{b}`"),
+            };
+            warnings.push(format!(
+                "{count} times a ray left the solid `{a}` without having entered it, or never left it, \
+                 when it was {within}: is each of them closed, with normals to the outside?"
+            ));
+        }
+        if faults.forgotten > 0 {
+            let count = faults.forgotten;
+            warnings.push(format!("{count} times a ray was inside more solids than it can remember"));
+        }
+        warnings
     }
 
     /// What the user should know of the frame that was prepared or rendered last.

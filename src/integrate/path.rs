@@ -15,23 +15,25 @@
 
 use super::SceneView;
 use super::share::{Departure, Landing, SharedPath};
-use super::vertex::Vertex;
+use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
+use crate::build::nesting::Meeting;
 use crate::description::Rgb;
 use crate::extract::{CameraRay, NOTHING};
 use crate::film::{FirstHit, PixelSample};
 use crate::math::{Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::Bsdf;
+use crate::shade::nesting::{Inside, NestingFaults};
 use glam::{DVec3, Vec2, Vec3};
 
 /// The path tracer with its settings.
 ///
-/// `OPACITY` and `ABSORPTION` say whether the scene requires surfaces with holes and solids which
-/// absorb; without them there is no code for them on the path.
+/// `OPACITY` says whether the scene requires surfaces with holes, and `I` what a path must know of the
+/// solids around it; what is not required has no code on the path.
 #[derive(Clone, Copy)]
-pub struct PathTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
+pub struct PathTracer<'a, const OPACITY: bool, I> {
     /// The scene.
     pub scene: SceneView<'a>,
     /// Greatest number of surface interactions.
@@ -46,6 +48,8 @@ pub struct PathTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
     pub wants_first_hit: bool,
     /// World position of the origin of render space.
     pub origin: DVec3,
+    /// What camera rays begin in; `None` where it depends on the ray.
+    pub start: Option<I>,
 }
 
 /// What happened on the paths of one tile.
@@ -55,13 +59,19 @@ pub struct PathCounters {
     pub rays: u64,
     /// Paths which were cut off at the greatest depth although they still carried something.
     pub truncated: u64,
+    /// Where solids were nested in a way that cannot be.
+    pub nesting: NestingFaults,
 }
 
 impl PathCounters {
     /// The sum of both.
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
-        Self { rays: self.rays + other.rays, truncated: self.truncated + other.truncated }
+        Self {
+            rays: self.rays + other.rays,
+            truncated: self.truncated + other.truncated,
+            nesting: self.nesting.plus(other.nesting),
+        }
     }
 }
 
@@ -75,7 +85,7 @@ pub(super) enum Arrival {
 }
 
 /// A path on its way.
-struct Path<'a> {
+struct Path<'a, I> {
     ray: Ray,
     radiance: Rgb,
     throughput: Rgb,
@@ -83,7 +93,7 @@ struct Path<'a> {
     eta_scale: f32,
     arrival: Arrival,
     first_hit: Option<FirstHit>,
-    inside: u32,
+    inside: I,
     /// Surface interactions.
     depth: u32,
     /// Surfaces met: those which let the ray pass count only here.
@@ -97,8 +107,8 @@ struct Path<'a> {
     boost: f32,
 }
 
-impl<'a> Path<'a> {
-    fn new(camera_ray: &CameraRay) -> Self {
+impl<'a, I> Path<'a, I> {
+    fn new(camera_ray: &CameraRay, inside: I) -> Self {
         Self {
             ray: camera_ray.ray,
             radiance: Rgb::ZERO,
@@ -106,7 +116,7 @@ impl<'a> Path<'a> {
             eta_scale: 1.0,
             arrival: Arrival::Sure,
             first_hit: None,
-            inside: NOTHING,
+            inside,
             depth: 0,
             met: 0,
             departure: None,
@@ -137,7 +147,13 @@ impl<'a> Path<'a> {
     }
 }
 
-impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, ABSORPTION> {
+impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
+    /// What a camera ray begins in.
+    #[inline]
+    pub(super) fn start(&self, ray: &Ray) -> I {
+        self.start.unwrap_or_else(|| I::new(&self.scene.nested().around(ray.o, ray.time)))
+    }
+
     /// The radiance which arrives along a camera ray.
     pub fn sample(
         &self,
@@ -145,7 +161,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> PixelSample {
-        let mut path = Path::new(camera_ray);
+        let mut path = Path::new(camera_ray, self.start(&camera_ray.ray));
         self.follow::<false>(&mut path, camera_ray, sampler, counters);
         PixelSample { radiance: path.radiance, first_hit: path.first_hit }
     }
@@ -157,7 +173,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> SharedPath<'a> {
-        let mut path = Path::new(camera_ray);
+        let mut path = Path::new(camera_ray, self.start(&camera_ray.ray));
         self.follow::<true>(&mut path, camera_ray, sampler, counters);
         let Path { radiance, first_hit, departure, mut landing, before, boost, .. } = path;
         let radiance = match &mut landing {
@@ -177,7 +193,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     /// had begun there, and what it had gathered before is put aside.
     fn follow<const SHARE: bool>(
         &self,
-        path: &mut Path<'a>,
+        path: &mut Path<'a, I>,
         camera_ray: &CameraRay,
         sampler: &Sampler,
         counters: &mut PathCounters,
@@ -187,19 +203,34 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             let from_camera = path.met == 0;
             let Some(hit) = self.scene.geometry.closest_hit(&path.ray, f64::INFINITY, from_camera)
             else {
+                if I::NESTS {
+                    self.scene.nested().escape(&path.inside, &mut counters.nesting);
+                }
                 let light = self.infinite(&path.ray, path.arrival);
                 path.radiance += self.limited(path.throughput * light, path.depth);
                 break;
             };
+            if I::ABSORBS {
+                path.throughput *= self.transmittance(&path.inside, hit.t);
+            }
+            let met =
+                self.scene.nested().meet(&path.ray, hit, &path.inside, &mut counters.nesting);
+            let (hit, surface, beyond, outside) = match met {
+                Meeting::Surface { hit, surface, beyond, outside } => {
+                    (hit, surface, beyond, outside)
+                }
+                Meeting::Nothing { surface, beyond } => {
+                    let SurfacePoint { p, p_error, ng, .. } = surface;
+                    path.ray.o = offset_ray_origin(p, p_error, ng, path.ray.d);
+                    path.inside = beyond;
+                    continue;
+                }
+            };
             let dimensions = dimension::vertex(path.met);
             path.met += 1;
-            let surface = self.scene.geometry.surface(&path.ray, &hit);
             let instance = &self.scene.geometry.instances[hit.instance as usize];
             let materials = &self.scene.surfaces.materials;
             let wo = -path.ray.d;
-            if ABSORPTION {
-                path.throughput *= self.transmittance(path.inside, hit.t);
-            }
             // One number decides whether the ray passes through a hole and, stretched back to the
             // whole interval, whether the path goes on.
             let mut roulette = None;
@@ -231,7 +262,11 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             } else {
                 0.0
             };
-            let bsdf = materials.bsdf(instance.material, surface.uv, &mut lobe);
+            let bsdf = if I::NESTS {
+                materials.bsdf_within(instance.material, surface.uv, &mut lobe, outside)
+            } else {
+                materials.bsdf(instance.material, surface.uv, &mut lobe)
+            };
             if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
                 let first = self.first_hit(camera_ray, &path.ray, &hit, &surface, Some(&bsdf));
                 path.first_hit = Some(first);
@@ -244,6 +279,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
                 path.land(&surface, wo, &bsdf);
             }
             let vertex = Vertex::new(surface, wo, bsdf);
+            let sides = Sides { here: path.inside, beyond };
             let receiver = vertex.receiver();
             let (to_scatter, on_light) =
                 sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
@@ -253,14 +289,9 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
                 } else {
                     0.0
                 };
-                let (wi, distance, light) =
-                    self.direct(&vertex, &receiver, choose, on_light, path.ray.time, counters);
-                let light = if ABSORPTION && light != Rgb::ZERO {
-                    let medium = self.medium_towards(wi, &vertex, instance.material, path.inside);
-                    light * self.transmittance(medium, distance)
-                } else {
-                    light
-                };
+                let time = path.ray.time;
+                let drawn = (choose, on_light);
+                let light = self.direct(&vertex, &receiver, &sides, drawn, time, counters);
                 path.radiance += self.limited(path.throughput * light, path.depth);
             }
             let Some((wi, sample)) = vertex.scatter(lobe, to_scatter) else {
@@ -278,9 +309,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             path.throughput *= sample.weight;
             path.depth += 1;
             path.eta_scale *= sample.eta * sample.eta;
-            if ABSORPTION {
-                path.inside = self.medium_towards(wi, &vertex, instance.material, path.inside);
-            }
+            path.inside = *sides.towards(wi, &vertex);
             if path.depth >= self.roulette_depth {
                 let carried = path.carried::<SHARE>() * path.eta_scale;
                 let survival = (carried.max_element() * self.roulette_gain).min(1.0);
@@ -341,71 +370,71 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         }
     }
 
-    /// Light which arrives straight from a light, by one connection: with its unit direction and its
-    /// distance in metres.
+    /// Light which arrives straight from a light, by one connection to the light and the point on it
+    /// that these numbers draw.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
         receiver: &Receiver,
-        choose: f64,
-        on_light: Vec2,
+        sides: &Sides<I>,
+        (choose, on_light): (f64, Vec2),
         time: f32,
         counters: &mut PathCounters,
-    ) -> (Vec3, f64, Rgb) {
-        const NONE: (Vec3, f64, Rgb) = (Vec3::ZERO, 0.0, Rgb::ZERO);
+    ) -> Rgb {
         let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
-            return NONE;
+            return Rgb::ZERO;
         };
         let (f_cos, pdf) = vertex.evaluate(light.wi);
         if f_cos == Rgb::ZERO {
-            return NONE;
+            return Rgb::ZERO;
         }
         let (shadow_ray, end) = light.shadow_ray(receiver, time);
         counters.rays += 1;
-        let visible = self.visible(&shadow_ray, end);
+        let inside = sides.towards(light.wi, vertex);
+        let visible = self.visible(&shadow_ray, end, inside);
         if visible == 0.0 {
-            return NONE;
+            return Rgb::ZERO;
         }
         let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
-        let distance = end * shadow_ray.d.as_dvec3().length();
-        (light.wi, distance, f_cos * light.radiance * (visible * weight / light.pdf))
-    }
-
-    /// The material of the solid in which a path goes on from a vertex in the direction `wi`, when it
-    /// arrived inside `inside`; [`NOTHING`] outside.
-    pub(super) fn medium_towards(
-        &self,
-        wi: Vec3,
-        vertex: &Vertex,
-        material: u32,
-        inside: u32,
-    ) -> u32 {
-        if !vertex.crosses(wi) || !self.scene.surfaces.materials.is_dielectric(material) {
-            return inside;
+        let arriving = f_cos * light.radiance * (visible * weight / light.pdf);
+        if I::ABSORBS && arriving != Rgb::ZERO {
+            let distance = end * shadow_ray.d.as_dvec3().length();
+            arriving * self.transmittance(inside, distance)
+        } else {
+            arriving
         }
-        let entering = wi.dot(vertex.surface.ng) < 0.0;
-        if entering { material } else { NOTHING }
     }
 
-    /// Share of the light which passes along a segment.
-    pub(super) fn visible(&self, shadow_ray: &Ray, end: f64) -> f32 {
-        if !OPACITY {
+    /// Share of the light which passes along a segment that begins inside `inside`, absorption apart.
+    pub(super) fn visible(&self, shadow_ray: &Ray, end: f64, inside: &I) -> f32 {
+        if !OPACITY && !I::NESTS {
             return if self.scene.geometry.occluded(shadow_ray, end) { 0.0 } else { 1.0 };
         }
-        // Holes let a share of the light through: follow the segment from surface to surface.
+        // Holes let a share of the light through, and surfaces inside of other solids all of it: follow the
+        // segment from surface to surface. What is found wrong is counted on the paths.
+        let (mut inside, mut faults) = (*inside, NestingFaults::default());
         let mut passed = 1.0;
         let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
         let mut ray = *shadow_ray;
         while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
-            let material = self.scene.geometry.instances[hit.instance as usize].material;
-            if material == NOTHING || !self.scene.surfaces.materials.has_opacity(material) {
-                return 0.0;
-            }
-            let surface = self.scene.geometry.surface(&ray, &hit);
-            passed *= 1.0 - self.scene.surfaces.materials.opacity(material, surface.uv);
-            if passed == 0.0 {
-                return 0.0;
-            }
+            let surface = match self.scene.nested().meet(&ray, hit, &inside, &mut faults) {
+                Meeting::Nothing { surface, beyond } => {
+                    inside = beyond;
+                    surface
+                }
+                Meeting::Surface { hit, surface, .. } => {
+                    let material = self.scene.geometry.instances[hit.instance as usize].material;
+                    let materials = &self.scene.surfaces.materials;
+                    if material == NOTHING || !materials.has_opacity(material) {
+                        return 0.0;
+                    }
+                    passed *= 1.0 - materials.opacity(material, surface.uv);
+                    if passed == 0.0 {
+                        return 0.0;
+                    }
+                    surface
+                }
+            };
             ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
             if end.is_finite() {
                 ray.d = (target - ray.o.as_dvec3()).as_vec3();
@@ -417,17 +446,11 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         passed
     }
 
-    /// Beer and Lambert's law inside a solid of this material over a distance in metres; 1 outside.
-    pub(super) fn transmittance(&self, material: u32, distance: f64) -> Rgb {
-        if material == NOTHING {
-            return Rgb::ONE;
-        }
-        match self.scene.surfaces.materials.attenuation(material) {
-            // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
-            Some(sigma_a) => sigma_a
-                .map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() }),
-            None => Rgb::ONE,
-        }
+    /// Share of the light which is left after a distance in metres, [`MaterialTable::transmittance`].
+    ///
+    /// [`MaterialTable::transmittance`]: crate::shade::MaterialTable::transmittance
+    pub(super) fn transmittance(&self, inside: &I, distance: f64) -> Rgb {
+        self.scene.surfaces.materials.transmittance(inside.medium(), distance)
     }
 
     /// The knob `clamp_indirect`; what the camera or its first surface sees is never limited.
