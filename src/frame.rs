@@ -127,6 +127,11 @@ pub struct Simulation {
     schedule: Schedule,
 }
 
+/// Share of rays which may find solids nested inconsistently in a scene where they are not: those which
+/// meet an edge within rounding and miss one of its two surfaces. For an edge seen across 10⁻³ of a
+/// picture and positions of 24 bits that is of the order 10⁻⁷; two in 4·10⁷ were measured.
+const NESTING_BY_CHANCE: f64 = 1e-6;
+
 /// When stages began and how long systems took, written by the marker systems between them.
 #[derive(Resource, Default)]
 pub(crate) struct StageClock {
@@ -290,7 +295,7 @@ impl Simulation {
                 .warnings()
                 .into_iter()
                 .chain(status.warnings)
-                .chain(self.nesting_warnings(&status.counters.nesting))
+                .chain(self.nesting_warnings(&status.counters.nesting, status.counters.rays))
                 .collect(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
@@ -388,14 +393,15 @@ impl Simulation {
     }
 
     /// Where rays found solids nested in a way that cannot be.
-    fn nesting_warnings(&self, faults: &NestingFaults) -> Vec<String> {
+    fn nesting_warnings(&self, faults: &NestingFaults, rays: u64) -> Vec<String> {
         let instances = self.world.resource::<Instances>();
         let name = |index: u32| {
             let name = instances.entity(index).and_then(|entity| self.world.get::<Name>(entity));
             name.map_or("", |name| name.as_str())
         };
         let mut warnings = Vec::new();
-        if let Some((a, b)) = faults.pair {
+        let seldom = faults.count as f64 <= NESTING_BY_CHANCE * rays as f64;
+        if let Some((a, b)) = faults.pair.filter(|_| !seldom) {
             let (count, a) = (faults.count, name(a));
             let within = match name(b) {
                 b if a == b => "in air".to_owned(),
@@ -408,7 +414,8 @@ impl Simulation {
         }
         if faults.forgotten > 0 {
             let count = faults.forgotten;
-            warnings.push(format!("{count} times a ray was inside more solids than it can remember"));
+            warnings
+                .push(format!("{count} times a ray was inside more solids than it can remember"));
         }
         warnings
     }

@@ -32,7 +32,8 @@ fn slab(z0: f64, z1: f64) -> TriangleMesh {
             Vec3::new(side(1), side(2), (if k & 4 == 0 { z0 } else { z1 }) as f32)
         })
         .collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     TriangleMesh { positions, triangles, ..Default::default() }
 }
@@ -86,7 +87,11 @@ fn water_in_a_glass_has_three_interfaces() {
                 let picture = render(&text, (64, 64), 32);
                 let what = format!("{angle}°, {reach} m, meshes: {as_meshes}");
                 picture.mean().assert_agrees(&what, expected, 1e-3);
-                assert!(picture.report.warnings.is_empty(), "{what}: {:?}", picture.report.warnings);
+                assert!(
+                    picture.report.warnings.is_empty(),
+                    "{what}: {:?}",
+                    picture.report.warnings
+                );
             }
         }
     }
@@ -104,7 +109,8 @@ fn a_gap_of_air_is_seen() {
     ]);
     let picture = render(&bench(0.0, &meshes, GLASS_AND_WATER, &objects), (64, 64), 32);
     picture.mean().assert_agrees("with a gap", expected, 1e-3);
-    let nested = pile(&[fresnel(1.0, 1.5, 0.0), fresnel(1.5, 1.333, 0.0), fresnel(1.333, 1.0, 0.0)]);
+    let nested =
+        pile(&[fresnel(1.0, 1.5, 0.0), fresnel(1.5, 1.333, 0.0), fresnel(1.333, 1.0, 0.0)]);
     assert!(nested - expected > 20.0 * picture.mean().error);
 }
 
@@ -123,7 +129,9 @@ fn where_solids_overlap_only_the_higher_absorbs() {
     ];
     for (a, b, expected) in cases {
         let solid = |name: &str, color: f64, priority: i32| {
-            format!(r#""{name}": Dielectric(ior: 1, priority: {priority}, attenuation: (color: ({color}, {color}, {color}), distance: 1))"#)
+            format!(
+                r#""{name}": Dielectric(ior: 1, priority: {priority}, attenuation: (color: ({color}, {color}, {color}), distance: 1))"#
+            )
         };
         let materials = format!("{}, {}", solid("red", 0.5, a), solid("blue", 0.25, b));
         for integrator in ["Path", "Sppm"] {
@@ -154,7 +162,10 @@ fn which_solid_wins_decides_where_light_bends() {
         let edge = aim - lengths[0] * tan(1.8) - lengths[1] * tan(1.3);
         let text = bench(50.0, "", &materials, objects).replace(
             r#"(translation: (0, 0, -9)), shape: Rectangle(size: (4000, 4000))"#,
-            &format!(r#"(translation: ({}, 0, -9)), shape: Rectangle(size: (2, 4000))"#, edge - 1.0),
+            &format!(
+                r#"(translation: ({}, 0, -9)), shape: Rectangle(size: (2, 4000))"#,
+                edge - 1.0
+            ),
         );
         let picture = render(&text, (64, 16), 64);
         let left = picture.mean_where(|x, _| x < 31).mean;
@@ -223,8 +234,9 @@ fn mean_difference(a: &Picture, b: &Picture) -> f64 {
 #[test]
 fn a_ball_of_the_index_of_water_vanishes_in_it() {
     let without = in_water("");
-    let ball =
-        |material| in_water(&format!(r#""ball": (shape: Sphere(radius: 1), material: "{material}")"#));
+    let ball = |material| {
+        in_water(&format!(r#""ball": (shape: Sphere(radius: 1), material: "{material}")"#))
+    };
     let (same, glass) = (ball("ball"), ball("glass"));
     let difference = mean_difference(&without, &same);
     assert!(difference < 2e-3, "{difference}");
@@ -291,7 +303,9 @@ fn photons_find_the_light_of_paths_through_nested_solids() {
     let through = |x: u32, y: u32| (6..18).contains(&x) && (6..18).contains(&y);
     for integrator in ["Sppm", "Path, caustics: Photons"] {
         let picture = tumbler(integrator, 256);
-        for (what, chosen) in [("all", &(|_, _| true) as &dyn Fn(u32, u32) -> bool), ("centre", &through)] {
+        for (what, chosen) in
+            [("all", &(|_, _| true) as &dyn Fn(u32, u32) -> bool), ("centre", &through)]
+        {
             let (found, wanted) = (picture.mean_where(chosen), expected.mean_where(chosen));
             let error = found.error.hypot(wanted.error);
             let difference = (found.mean - wanted.mean).abs();

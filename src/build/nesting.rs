@@ -189,10 +189,8 @@ impl NestedGeometry<'_> {
         let surface = &mut crossings[0].surface;
         surface.p_error *= SAME_PLACE;
         let SurfacePoint { p, p_error, ng, .. } = *surface;
-        let (near, far) = (
-            offset_ray_origin(p, p_error, ng, -ray.d),
-            offset_ray_origin(p, p_error, ng, ray.d),
-        );
+        let (near, far) =
+            (offset_ray_origin(p, p_error, ng, -ray.d), offset_ray_origin(p, p_error, ng, ray.d));
         let probe = Ray { o: near, d: far - near, time: ray.time };
         let ends = Aabb::from_points([near, far]);
         let mut count = 1;
@@ -316,8 +314,12 @@ impl Solids {
 
     /// Bytes held.
     pub fn memory(&self) -> usize {
-        let trees: usize =
-            self.list.iter().filter_map(|entry| entry.tree.as_ref()).map(|tree| tree.memory()).sum();
+        let trees: usize = self
+            .list
+            .iter()
+            .filter_map(|entry| entry.tree.as_ref())
+            .map(|tree| tree.memory())
+            .sum();
         let words = (self.places.capacity() + self.neighbours.capacity()) * size_of::<u32>();
         trees + words + self.list.capacity() * size_of::<Entry>()
     }

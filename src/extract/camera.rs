@@ -110,7 +110,9 @@ impl ViewCamera {
         let radius = self.lens_radius.iter().copied().fold(0.0, f64::max);
         let half = match &self.projection {
             Projection::Perspective { .. } => DVec2::ZERO,
-            Projection::Orthographic { half_height } => DVec2::new(half_height * aspect, *half_height),
+            Projection::Orthographic { half_height } => {
+                DVec2::new(half_height * aspect, *half_height)
+            }
         };
         let half = (half + radius).extend(0.0).as_vec3();
         let lens = Aabb { min: -half, max: half };

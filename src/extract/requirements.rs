@@ -171,7 +171,8 @@ fn nesting<'a>(
     let found = solids(list, materials);
     let pairs = overlapping_pairs(list, &found);
     if let Some(&(a, b)) = pairs.first() {
-        let more = if pairs.len() > 1 { format!(" and {} more", pairs.len() - 1) } else { String::new() };
+        let more =
+            if pairs.len() > 1 { format!(" and {} more", pairs.len() - 1) } else { String::new() };
         return Some(format!("the boxes of `{}` and `{}` overlap{more}", name(a), name(b)));
     }
     if census.absorbing == 0 {
@@ -180,7 +181,8 @@ fn nesting<'a>(
     let eye = camera.reach();
     let point = |light: &PunctualLight| {
         let p = light.motion.at(0.0).translation.as_vec3();
-        matches!(light.light, Light::Point { .. } | Light::Spot { .. }).then(|| Aabb::from_points([p]))
+        matches!(light.light, Light::Point { .. } | Light::Spot { .. })
+            .then(|| Aabb::from_points([p]))
     };
     let shining = list.iter().filter(|instance| instance.emission != NOTHING).map(|i| i.bounds);
     let lamps: Vec<Aabb> = shining.chain(lights.0.iter().filter_map(point)).collect();

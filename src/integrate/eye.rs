@@ -262,8 +262,9 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             return false;
         }
         let mut lobe = sampler.one(dimensions + dimension::LOBE);
-        let bsdf = (material != NOTHING)
-            .then(|| scene.surfaces.materials.bsdf_within(material, surface.uv, &mut lobe, outside));
+        let bsdf = (material != NOTHING).then(|| {
+            scene.surfaces.materials.bsdf_within(material, surface.uv, &mut lobe, outside)
+        });
         if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
             let ray = &walk.ray;
             let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());
@@ -488,7 +489,13 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         query
     }
 
-    fn gather(&self, map: &PhotonMap, walk: &Walk<I>, vertex: &Vertex, context: &mut Context) -> Rgb {
+    fn gather(
+        &self,
+        map: &PhotonMap,
+        walk: &Walk<I>,
+        vertex: &Vertex,
+        context: &mut Context,
+    ) -> Rgb {
         if map.is_empty() {
             return Rgb::ZERO;
         }

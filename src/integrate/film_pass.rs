@@ -156,13 +156,10 @@ impl<'a> Begin<'a> {
             return Some(I::new(&SolidStack::default()));
         }
         let eye = self.scene.camera.reach();
-        (eye.max - eye.min == Vec3::ZERO)
-            .then(|| I::new(&self.scene.nested().around(eye.min, 0.0)))
+        (eye.max - eye.min == Vec3::ZERO).then(|| I::new(&self.scene.nested().around(eye.min, 0.0)))
     }
 
-    pub(super) fn tracer<const OPACITY: bool, I: Inside>(
-        &self,
-    ) -> PathTracer<'a, OPACITY, I> {
+    pub(super) fn tracer<const OPACITY: bool, I: Inside>(&self) -> PathTracer<'a, OPACITY, I> {
         PathTracer {
             scene: self.scene,
             max_depth: self.settings.max_depth,

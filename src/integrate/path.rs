@@ -213,8 +213,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             if I::ABSORBS {
                 path.throughput *= self.transmittance(&path.inside, hit.t);
             }
-            let met =
-                self.scene.nested().meet(&path.ray, hit, &path.inside, &mut counters.nesting);
+            let met = self.scene.nested().meet(&path.ray, hit, &path.inside, &mut counters.nesting);
             let (hit, surface, beyond, outside) = match met {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)

@@ -1,8 +1,8 @@
 //! The tables of a frame, together, as an integrator sees them.
 
 use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
-use crate::build::nesting::{NestedGeometry, Solids};
 use crate::build::light::{LightTable, Lights, ShapeLights};
+use crate::build::nesting::{NestedGeometry, Solids};
 use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;

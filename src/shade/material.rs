@@ -341,7 +341,8 @@ impl MaterialTable {
                 let Some(pair) = self.relative.find(material, index.ior) else {
                     return Bsdf::SmoothDielectric(SmoothDielectric { eta });
                 };
-                let roughness = |texture: u32| texture::scalar(&self.textures[texture as usize], uv);
+                let roughness =
+                    |texture: u32| texture::scalar(&self.textures[texture as usize], uv);
                 pair.bsdf(eta, roughness)
             }
             Kind::Mix { a, b, amount } => {

@@ -231,11 +231,7 @@ impl NestingFaults {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),
         };
-        Self {
-            count: self.count + other.count,
-            pair,
-            forgotten: self.forgotten + other.forgotten,
-        }
+        Self { count: self.count + other.count, pair, forgotten: self.forgotten + other.forgotten }
     }
 
     /// A ray found that it was not, or was still, inside `solid`, when it took itself to be in `within`.
