@@ -111,7 +111,12 @@ fn spheres(material: Material, lace: bool) -> Simulation {
 
 /// The same geometry with and without surfaces with holes, with and without absorption inside.
 fn features(c: &mut Criterion) {
-    let glass = |attenuation| Material::Dielectric { ior: 1.5, roughness: 0.0.into(), attenuation };
+    let glass = |attenuation| Material::Dielectric {
+        ior: 1.5,
+        roughness: 0.0.into(),
+        attenuation,
+        priority: 0,
+    };
     let amber = Attenuation { color: Vec3::new(0.9, 0.6, 0.2), distance: 0.2 };
     let diffuse = || Material::Diffuse { albedo: Vec3::splat(0.6).into() };
     let cases = [

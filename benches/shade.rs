@@ -28,6 +28,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
         ior: 1.5,
         roughness: roughness.into(),
         attenuation: None,
+        priority: 0,
     };
     vec![
         ("diffuse", Material::Diffuse { albedo: orange.into() }),

@@ -6,6 +6,7 @@ use common::scene;
 use glam::{DVec3, Vec3};
 use kinora::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
 use kinora::build::light::{Aim, LightTable, Lights, PhotonNumbers, PhotonSource, ShapeLights};
+use kinora::build::nesting::{NestedGeometry, Solids};
 use kinora::build::photon::{
     Keep, Photon, PhotonMap, PhotonPass, PhotonStore, PhotonTracer, QueryPoint,
 };
@@ -14,7 +15,9 @@ use kinora::extract::{FrameOrigin, Instances, PunctualLights, Surfaces};
 use kinora::frame::Simulation;
 use kinora::math::Aabb;
 use kinora::sampling::Sampler;
+use kinora::shade::nesting::OneSolid;
 use std::f64::consts::PI;
+use std::marker::PhantomData;
 use std::sync::atomic::AtomicBool;
 
 /// The tables of the first frame of a scene.
@@ -65,9 +68,12 @@ impl Tables {
         let storable: Vec<bool> =
             (0..materials.len() as u32).map(|m| materials.may_be_storable(m, 0.1)).collect();
         let source = self.source();
-        let tracer = PhotonTracer::<true, true> {
-            geometry: self.geometry(),
-            materials,
+        let tracer = PhotonTracer::<true, OneSolid> {
+            scene: NestedGeometry {
+                geometry: self.geometry(),
+                materials,
+                solids: self.get::<Solids>(),
+            },
             lights: self.lights(),
             source: &source,
             aim,
@@ -75,6 +81,7 @@ impl Tables {
             min_alpha: 0.1,
             max_depth,
             keep,
+            inside: PhantomData,
         };
         let pass = PhotonPass { seed: 5, frame: 0, pass: 0, emitted: n, time: 0.0 };
         let mut store = PhotonStore::default();

@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod light;
 mod memory;
+pub mod nesting;
 pub mod photon;
 
 pub(crate) use memory::trees_fit;
@@ -20,6 +21,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(light::PhotonSource::default());
     world.insert_resource(light::ShapeLights::default());
     world.insert_resource(TreeMemory::default());
+    world.insert_resource(nesting::Solids::default());
     let trees = (
         bvh::join_resting_meshes,
         stamp("tree of resting meshes"),
@@ -27,6 +29,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         stamp("mesh trees"),
         bvh::rebuild_top_level,
         stamp("top level"),
+        (nesting::find_solids, stamp("solids")).chain().run_if(solids_nest),
         light::rebuild_light_table,
         light::prepare_shape_lights,
         stamp("light table"),
@@ -35,6 +38,11 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     );
     let trees = trees.chain().run_if(trees_fit);
     frame.add_systems((forecast_tree_memory, trees).chain().in_set(FrameSystems::Build));
+}
+
+/// Whether solids may overlap in this frame.
+fn solids_nest(requirements: Res<crate::extract::Requirements>) -> bool {
+    requirements.has(crate::extract::Feature::NestedDielectrics)
 }
 
 /// Whether the integrator of this frame works with photons.

@@ -36,6 +36,10 @@ pub enum Material<R> {
         /// Absorption inside; `None` is perfectly clear.
         #[serde(default)]
         attenuation: Option<Attenuation>,
+        /// Where solids overlap, the one of the highest priority is there; the surface of another is
+        /// not seen inside it. Among equal ones the solid that the scene names first wins.
+        #[serde(default)]
+        priority: i32,
     },
     /// A pane so thin that light is not displaced: both interfaces of the sheet at once.
     ThinGlass {
@@ -163,9 +167,12 @@ impl<R> Material<R> {
             Self::Mirror { reflectance } => {
                 Material::Mirror { reflectance: reflectance.map_ref(textures)? }
             }
-            Self::Dielectric { ior, roughness, attenuation } => {
-                Material::Dielectric { ior, roughness: roughness.map_ref(textures)?, attenuation }
-            }
+            Self::Dielectric { ior, roughness, attenuation, priority } => Material::Dielectric {
+                ior,
+                roughness: roughness.map_ref(textures)?,
+                attenuation,
+                priority,
+            },
             Self::ThinGlass { ior, tint } => {
                 Material::ThinGlass { ior, tint: tint.map_ref(textures)? }
             }

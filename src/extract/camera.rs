@@ -6,7 +6,7 @@
 //! *Physically Based Rendering*, 4th ed., section 5.2.3).
 
 use crate::description::Focus;
-use crate::math::{MotionTransform, Ray};
+use crate::math::{Aabb, MotionTransform, Ray};
 use crate::sampling::warp::{square_to_disk, square_to_polygon};
 use crate::world::{ActiveCamera, Camera, LookAt, Optics, Settings, ShutterMotion};
 use bevy_ecs::prelude::*;
@@ -100,6 +100,26 @@ impl ViewCamera {
             Projection::Orthographic { .. } => false,
         };
         self.motion.is_static() && !zooms && self.focus.len() <= 1
+    }
+
+    /// A box around all points where its rays begin, in render space; of a moving camera as a row of
+    /// times finds it.
+    pub fn reach(&self) -> Aabb {
+        const TIMES: u16 = 8;
+        let aspect = f64::from(self.size.0) / f64::from(self.size.1);
+        let radius = self.lens_radius.iter().copied().fold(0.0, f64::max);
+        let half = match &self.projection {
+            Projection::Perspective { .. } => DVec2::ZERO,
+            Projection::Orthographic { half_height } => {
+                DVec2::new(half_height * aspect, *half_height)
+            }
+        };
+        let half = (half + radius).extend(0.0).as_vec3();
+        let lens = Aabb { min: -half, max: half };
+        let times = if self.motion.is_static() { 0..=0 } else { 0..=TIMES };
+        times
+            .map(|k| lens.transformed(&self.motion.at(f32::from(k) / f32::from(TIMES))))
+            .fold(Aabb::EMPTY, Aabb::union)
     }
 
     /// The ray through the film point `film` (pixels, x right, y down, (0, 0) the corner of the upper

@@ -94,6 +94,11 @@ impl Instances {
         self.slots.get(&entity).copied()
     }
 
+    /// The entity of an instance.
+    pub(crate) fn entity(&self, slot: u32) -> Option<Entity> {
+        self.entities.get(slot as usize).copied()
+    }
+
     /// Has all of the table written anew in the next frame: its changes were not built upon.
     pub(crate) fn mark_unseen(&mut self) {
         self.unseen = true;

@@ -13,6 +13,7 @@ mod lights;
 mod method;
 mod requirements;
 mod resting;
+mod solids;
 mod surfaces;
 
 pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
@@ -23,6 +24,7 @@ pub use lights::{PunctualLight, PunctualLights, extract_lights};
 pub use method::{ChosenIntegrator, Method, choose_integrator};
 pub use requirements::{Feature, Requirements, derive_requirements};
 pub use resting::{RestingMesh, RestingMeshes, extract_resting_meshes};
+pub use solids::{may_enclose, overlap, overlapping_pairs, solids};
 pub use surfaces::{SurfaceSlots, Surfaces, extract_surfaces};
 
 use crate::frame::{FrameSystems, stamp};

@@ -1,7 +1,12 @@
 //! What a scene requires, with the reason; everything else is left out of the work.
 
-use super::{Instances, Meshes, PunctualLights, Surfaces, ViewCamera};
+use super::{
+    Instances, Meshes, NOTHING, PunctualLight, PunctualLights, Surfaces, ViewCamera, may_enclose,
+    overlapping_pairs, solids,
+};
 use crate::description::Light;
+use crate::math::Aabb;
+use crate::shade::MaterialTable;
 use crate::world::{Deformation, Name, Settings, Shape, ShutterMotion, VertexMotion};
 use bevy_ecs::prelude::*;
 
@@ -20,6 +25,9 @@ pub enum Feature {
     Opacity,
     /// Solids which absorb light inside.
     Absorption,
+    /// Solids which may overlap, or absorb around the camera or a light: rays must know all that they
+    /// are inside of.
+    NestedDielectrics,
     /// Light from all around.
     Sky,
     /// Light which reaches diffuse surfaces through mirrors or glass.
@@ -45,6 +53,7 @@ impl Requirements {
 pub struct Census {
     masked: usize,
     absorbing: usize,
+    solid: usize,
     /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
     storable: usize,
@@ -64,6 +73,7 @@ impl Census {
         for (material, count) in (0..).zip(objects).filter(|(_, count)| *count > 0) {
             census.masked += if materials.has_opacity(material) { count } else { 0 };
             census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
+            census.solid += if materials.is_dielectric(material) { count } else { 0 };
             let specular = materials.may_cast_caustics(material, min_alpha);
             census.specular += if specular { count } else { 0 };
             let storable = materials.may_be_storable(material, min_alpha);
@@ -84,6 +94,7 @@ pub fn derive_requirements(
     camera: Res<ViewCamera>,
     settings: Res<Settings>,
     named: Query<(&ShutterMotion, &Name), With<Shape>>,
+    names: Query<&Name, With<Shape>>,
     mut census: Local<Census>,
     deforming: Query<(Option<&Name>, &VertexMotion), With<Deformation>>,
     mut requirements: ResMut<Requirements>,
@@ -127,6 +138,14 @@ pub fn derive_requirements(
     if census.absorbing > 0 {
         require(Feature::Absorption, format!("{} absorbing solids", census.absorbing));
     }
+    let tables = (&*instances, &surfaces.materials);
+    let name = |index: u32| {
+        let entity = instances.entity(index);
+        entity.and_then(|entity| names.get(entity).ok()).map_or("", |name| name.as_str())
+    };
+    if let Some(reason) = nesting(tables, &census, &camera, &lights, name) {
+        require(Feature::NestedDielectrics, reason);
+    }
     let skies = lights.0.iter().filter(|l| matches!(l.light, Light::Sky { .. })).count();
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
@@ -136,6 +155,50 @@ pub fn derive_requirements(
         require(Feature::Caustics, reason);
     }
     requirements.set_if_neq(found);
+}
+
+/// Why rays must know all solids that they are inside of, if they must.
+fn nesting<'a>(
+    (instances, materials): (&Instances, &MaterialTable),
+    census: &Census,
+    camera: &ViewCamera,
+    lights: &PunctualLights,
+    name: impl Fn(u32) -> &'a str,
+) -> Option<String> {
+    if census.solid < 2 && census.absorbing == 0 {
+        return None;
+    }
+    let list = &instances.list;
+    let found = solids(list, materials);
+    let pairs = overlapping_pairs(list, &found);
+    if let Some(&(a, b)) = pairs.first() {
+        let more =
+            if pairs.len() > 1 { format!(" and {} more", pairs.len() - 1) } else { String::new() };
+        return Some(format!("the boxes of `{}` and `{}` overlap{more}", name(a), name(b)));
+    }
+    if census.absorbing == 0 {
+        return None;
+    }
+    let eye = camera.reach();
+    let point = |light: &PunctualLight| {
+        let p = light.motion.at(0.0).translation.as_vec3();
+        matches!(light.light, Light::Point { .. } | Light::Spot { .. })
+            .then(|| Aabb::from_points([p]))
+    };
+    let shining = list.iter().filter(|instance| instance.emission != NOTHING).map(|i| i.bounds);
+    let lamps: Vec<Aabb> = shining.chain(lights.0.iter().filter_map(point)).collect();
+    found
+        .into_iter()
+        .filter(|&solid| materials.attenuation(list[solid as usize].material).is_some())
+        .find_map(|solid| {
+            let may_hold = |place: &Aabb| may_enclose(&list[solid as usize], place);
+            let what = if may_hold(&eye) {
+                "the camera"
+            } else {
+                lamps.iter().any(may_hold).then_some("a light")?
+            };
+            Some(format!("{what} may be inside `{}`, which absorbs", name(solid)))
+        })
 }
 
 /// The first three names of what moves, in the order of names.

@@ -21,15 +21,17 @@
 //! Journal of Graphics Tools 4(3)).
 
 use super::path::{Arrival, PathCounters, PathTracer};
-use super::vertex::Vertex;
-use crate::build::bvh::Hit;
+use super::vertex::{Sides, Vertex};
+use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
+use crate::build::nesting::Meeting;
 use crate::build::photon::{PhotonMap, QueryPoint};
 use crate::description::{DirectLight, PhotonSettings, Rgb};
 use crate::extract::{CameraRay, Method, NOTHING};
 use crate::film::PixelSample;
 use crate::math::{Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
+use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
 
@@ -50,8 +52,8 @@ pub(super) struct Maps<'a> {
 
 /// Follows camera paths for the methods with photons.
 #[derive(Clone, Copy)]
-pub(super) struct EyeTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
-    pub path: PathTracer<'a, OPACITY, ABSORPTION>,
+pub(super) struct EyeTracer<'a, const OPACITY: bool, I> {
+    pub path: PathTracer<'a, OPACITY, I>,
     pub method: Method,
     pub settings: &'a PhotonSettings,
     /// Rays of a final gathering.
@@ -115,13 +117,13 @@ enum Since {
 
 /// A path on its way.
 #[derive(Clone, Copy)]
-struct Walk {
+struct Walk<I> {
     ray: Ray,
     throughput: Rgb,
     eta_scale: f32,
     arrival: Arrival,
     since: Since,
-    inside: u32,
+    inside: I,
     depth: u32,
     met: u32,
     /// Length of the path, metres.
@@ -144,7 +146,7 @@ struct Context<'a> {
     distances: Vec<f32>,
 }
 
-impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPTION> {
+impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     /// The radiance which arrives along a camera ray, as this pass sees it.
     pub fn sample(
         &self,
@@ -159,7 +161,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
             eta_scale: 1.0,
             arrival: Arrival::Sure,
             since: Since::Never,
-            inside: NOTHING,
+            inside: self.path.start(&camera_ray.ray),
             depth: 0,
             met: 0,
             length: 0.0,
@@ -180,11 +182,11 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     }
 
     /// Whether light met by chance on this path is left to photons.
-    fn left_to_photons(&self, walk: &Walk) -> bool {
+    fn left_to_photons(&self, walk: &Walk<I>) -> bool {
         walk.since == Since::Specular && self.method != Method::Sppm
     }
 
-    fn walk(&self, mut walk: Walk, sampler: &Sampler, context: &mut Context) {
+    fn walk(&self, mut walk: Walk<I>, sampler: &Sampler, context: &mut Context) {
         while let Some(hit) = self.advance(&mut walk, context) {
             if !self.interact(&mut walk, &hit, sampler, context) {
                 return;
@@ -193,10 +195,13 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     }
 
     /// The next surface; adds light from infinity where there is none.
-    fn advance(&self, walk: &mut Walk, context: &mut Context) -> Option<Hit> {
+    fn advance(&self, walk: &mut Walk<I>, context: &mut Context) -> Option<Hit> {
         context.counters.rays += 1;
         let from_camera = walk.met == 0;
         let hit = self.path.scene.geometry.closest_hit(&walk.ray, f64::INFINITY, from_camera);
+        if I::NESTS && hit.is_none() {
+            self.path.scene.nested().escape(&walk.inside, &mut context.counters.nesting);
+        }
         if hit.is_none() && !self.left_to_photons(walk) {
             let light = self.path.infinite(&walk.ray, walk.arrival);
             context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
@@ -207,21 +212,34 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     /// Everything at one surface; whether the path goes on.
     fn interact(
         &self,
-        walk: &mut Walk,
+        walk: &mut Walk<I>,
         hit: &Hit,
         sampler: &Sampler,
         context: &mut Context,
     ) -> bool {
         let scene = &self.path.scene;
+        walk.length += hit.t;
+        if I::ABSORBS {
+            walk.throughput *= self.path.transmittance(&walk.inside, hit.t);
+        }
+        let counters = &mut context.counters.nesting;
+        let (hit, surface, beyond, outside) =
+            match scene.nested().meet(&walk.ray, *hit, &walk.inside, counters) {
+                Meeting::Surface { hit, surface, beyond, outside } => {
+                    (hit, surface, beyond, outside)
+                }
+                Meeting::Nothing { surface, beyond } => {
+                    let SurfacePoint { p, p_error, ng, .. } = surface;
+                    walk.ray.o = offset_ray_origin(p, p_error, ng, walk.ray.d);
+                    walk.inside = beyond;
+                    return true;
+                }
+            };
+        let hit = &hit;
         let dimensions = dimension::vertex(walk.met);
         walk.met += 1;
-        walk.length += hit.t;
-        let surface = scene.geometry.surface(&walk.ray, hit);
         let material = scene.geometry.instances[hit.instance as usize].material;
         let wo = -walk.ray.d;
-        if ABSORPTION {
-            walk.throughput *= self.path.transmittance(walk.inside, hit.t);
-        }
         let mut roulette = None;
         if OPACITY && material != NOTHING {
             let opacity = scene.surfaces.materials.opacity(material, surface.uv);
@@ -244,8 +262,9 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
             return false;
         }
         let mut lobe = sampler.one(dimensions + dimension::LOBE);
-        let bsdf = (material != NOTHING)
-            .then(|| scene.surfaces.materials.bsdf(material, surface.uv, &mut lobe));
+        let bsdf = (material != NOTHING).then(|| {
+            scene.surfaces.materials.bsdf_within(material, surface.uv, &mut lobe, outside)
+        });
         if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
             let ray = &walk.ray;
             let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());
@@ -257,6 +276,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
             return false;
         }
         let vertex = Vertex::new(surface, wo, bsdf);
+        let sides = Sides { here: walk.inside, beyond };
         let receiver = vertex.receiver();
         let storable = bsdf.is_storable(self.settings.min_alpha());
         // A ray of a final gathering reads all photons where it is long enough.
@@ -265,7 +285,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         if !read_here {
             if self.takes_light_rays(walk, &bsdf, storable) {
                 let choose = sampler.one_fine(dimensions + dimension::LIGHT);
-                self.light_rays(walk, &vertex, &receiver, (choose, on_light), material, context);
+                self.light_rays(walk, &vertex, &receiver, (choose, on_light), &sides, context);
             }
             if storable {
                 self.gather_here(walk, &vertex, context);
@@ -273,14 +293,14 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         }
         let gathers = storable && self.gathers_finally(walk);
         if gathers {
-            self.final_gathering(walk, &vertex, &receiver, material, context);
+            self.final_gathering(walk, &vertex, &receiver, &sides, context);
         }
         let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { return false };
         let diffuse = storable && !drawn.delta;
         if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
             return false;
         }
-        self.turn(walk, &vertex, &receiver, (wi, &drawn), diffuse, material);
+        self.turn(walk, &vertex, &receiver, (wi, &drawn), diffuse, &sides);
         if walk.last {
             return true;
         }
@@ -298,7 +318,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
 
     /// Whether a path ends where a diffuse lobe would take it on; otherwise `Sppm` and `PhotonMap` send one ray
     /// more, which looks for lights alone.
-    fn ends_at_diffuse(&self, walk: &mut Walk) -> bool {
+    fn ends_at_diffuse(&self, walk: &mut Walk<I>) -> bool {
         match self.method {
             Method::Sppm if self.settings.direct == DirectLight::Photons => true,
             Method::Sppm => {
@@ -313,7 +333,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         }
     }
 
-    fn gathers_finally(&self, walk: &Walk) -> bool {
+    fn gathers_finally(&self, walk: &Walk<I>) -> bool {
         self.method == Method::PhotonMap
             && self.final_gather > 0
             && !walk.reads
@@ -321,7 +341,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     }
 
     /// Whether rays are sent to the lights from here.
-    fn takes_light_rays(&self, walk: &Walk, bsdf: &Bsdf, storable: bool) -> bool {
+    fn takes_light_rays(&self, walk: &Walk<I>, bsdf: &Bsdf, storable: bool) -> bool {
         if !bsdf.has_non_delta() {
             return false;
         }
@@ -334,25 +354,20 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     /// Sends a ray to a point of a light, drawn by these numbers.
     fn light_rays(
         &self,
-        walk: &Walk,
+        walk: &Walk<I>,
         vertex: &Vertex,
         receiver: &Receiver,
-        (choose, on_light): (f64, Vec2),
-        material: u32,
+        drawn: (f64, Vec2),
+        sides: &Sides<I>,
         context: &mut Context,
     ) {
         let time = walk.ray.time;
-        let (wi, distance, mut light) =
-            self.path.direct(vertex, receiver, choose, on_light, time, context.counters);
-        if ABSORPTION && light != Rgb::ZERO {
-            let medium = self.path.medium_towards(wi, vertex, material, walk.inside);
-            light *= self.path.transmittance(medium, distance);
-        }
+        let light = self.path.direct(vertex, receiver, sides, drawn, time, context.counters);
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
     }
 
     /// Gathers what the method has at a storable point of a camera path.
-    fn gather_here(&self, walk: &Walk, vertex: &Vertex, context: &mut Context) {
+    fn gather_here(&self, walk: &Walk<I>, vertex: &Vertex, context: &mut Context) {
         let mut light = Rgb::ZERO;
         let global = match self.method {
             Method::Sppm => true,
@@ -369,7 +384,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     }
 
     /// Reads all photons at the end of a ray of a final gathering; `false` if the ray is too short.
-    fn read(&self, walk: &Walk, hit: &Hit, vertex: &Vertex, context: &mut Context) -> bool {
+    fn read(&self, walk: &Walk<I>, hit: &Hit, vertex: &Vertex, context: &mut Context) -> bool {
         let query = self.query(self.maps.global, walk, vertex, context);
         if hit.t < f64::from(query.radius) {
             return false;
@@ -382,10 +397,10 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     /// Sends the rays of a final gathering over the lobes which are not deltas.
     fn final_gathering(
         &self,
-        walk: &Walk,
+        walk: &Walk<I>,
         vertex: &Vertex,
         receiver: &Receiver,
-        material: u32,
+        sides: &Sides<I>,
         context: &mut Context,
     ) {
         let n = self.final_gather;
@@ -399,7 +414,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
                 continue; // the camera path itself goes on there
             }
             let mut ray = Walk { reads: true, throughput: walk.throughput / n as f32, ..*walk };
-            self.turn(&mut ray, vertex, receiver, (wi, &drawn), true, material);
+            self.turn(&mut ray, vertex, receiver, (wi, &drawn), true, sides);
             self.walk(ray, &sampler, context);
         }
     }
@@ -407,19 +422,17 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     /// Sends a path on in the direction drawn.
     fn turn(
         &self,
-        walk: &mut Walk,
+        walk: &mut Walk<I>,
         vertex: &Vertex,
         receiver: &Receiver,
         (wi, drawn): (Vec3, &BsdfSample),
         diffuse: bool,
-        material: u32,
+        sides: &Sides<I>,
     ) {
         walk.throughput *= drawn.weight;
         walk.eta_scale *= drawn.eta * drawn.eta;
         walk.depth += 1;
-        if ABSORPTION {
-            walk.inside = self.path.medium_towards(wi, vertex, material, walk.inside);
-        }
+        walk.inside = *sides.towards(wi, vertex);
         walk.since = match (diffuse, walk.since) {
             (true, _) => Since::Diffuse,
             (false, Since::Never) => Since::Never,
@@ -436,7 +449,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     }
 
     /// Whether rays were sent to the lights from the surface that is left.
-    fn path_takes_light(&self, walk: &Walk, diffuse: bool) -> bool {
+    fn path_takes_light(&self, walk: &Walk<I>, diffuse: bool) -> bool {
         diffuse || self.method == Method::Sppm || walk.since == Since::Never
     }
 
@@ -444,7 +457,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
     fn query(
         &self,
         map: &PhotonMap,
-        walk: &Walk,
+        walk: &Walk<I>,
         vertex: &Vertex,
         context: &mut Context,
     ) -> QueryPoint {
@@ -476,7 +489,13 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         query
     }
 
-    fn gather(&self, map: &PhotonMap, walk: &Walk, vertex: &Vertex, context: &mut Context) -> Rgb {
+    fn gather(
+        &self,
+        map: &PhotonMap,
+        walk: &Walk<I>,
+        vertex: &Vertex,
+        context: &mut Context,
+    ) -> Rgb {
         if map.is_empty() {
             return Rgb::ZERO;
         }
@@ -489,7 +508,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> EyeTracer<'_, OPACITY, ABSORPT
         &self,
         map: &PhotonMap,
         query: &QueryPoint,
-        walk: &Walk,
+        walk: &Walk<I>,
         vertex: &Vertex,
         context: &mut Context,
     ) -> Rgb {

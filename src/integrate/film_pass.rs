@@ -8,9 +8,10 @@ use crate::extract::{CameraRay, Feature, FrameOrigin, Requirements};
 use crate::film::{Film, FilmError, FilterSampler, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::sampling::{Sampler, dimension};
+use crate::shade::nesting::{Clear, Inside, OneSolid, SolidStack};
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::prelude::*;
-use glam::{DVec2, Vec2};
+use glam::{DVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Mutex, PoisonError};
@@ -90,11 +91,13 @@ pub fn render_film(
     let requires = |feature| scene.requirements.has(feature);
     let job = Job::new(settings, &scene, clock.frame, &control);
     let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
-    let counters = match (requires(Feature::Opacity), requires(Feature::Absorption)) {
-        (false, false) => fill(&mut film, &begin.tracer::<false, false>(), &job),
-        (false, true) => fill(&mut film, &begin.tracer::<false, true>(), &job),
-        (true, false) => fill(&mut film, &begin.tracer::<true, false>(), &job),
-        (true, true) => fill(&mut film, &begin.tracer::<true, true>(), &job),
+    let counters = match (requires(Feature::Opacity), Around::new(scene.requirements)) {
+        (false, Around::Clear) => fill(&mut film, &begin.tracer::<false, Clear>(), &job),
+        (false, Around::One) => fill(&mut film, &begin.tracer::<false, OneSolid>(), &job),
+        (false, Around::Nested) => fill(&mut film, &begin.tracer::<false, SolidStack>(), &job),
+        (true, Around::Clear) => fill(&mut film, &begin.tracer::<true, Clear>(), &job),
+        (true, Around::One) => fill(&mut film, &begin.tracer::<true, OneSolid>(), &job),
+        (true, Around::Nested) => fill(&mut film, &begin.tracer::<true, SolidStack>(), &job),
     };
     if let Some(counters) = counters {
         status.film = Some(film);
@@ -102,14 +105,39 @@ pub fn render_film(
     }
 }
 
+/// What paths must know of the solids around them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Around {
+    Clear,
+    One,
+    Nested,
+}
+
+impl Around {
+    pub(super) fn new(requirements: &Requirements) -> Self {
+        if requirements.has(Feature::NestedDielectrics) {
+            Self::Nested
+        } else if requirements.has(Feature::Absorption) {
+            Self::One
+        } else {
+            Self::Clear
+        }
+    }
+}
+
 /// The side of the groups which share their paths.
 ///
-/// Paths of different times see different scenes; surfaces with holes and solids which absorb would
-/// have to be followed along every connection; and a limit on radiance is one of single paths.
+/// Paths of different times see different scenes; surfaces with holes and solids which absorb or
+/// overlap would have to be followed along every connection; and a limit on radiance is one of single paths.
 fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
-    let hindered = [Feature::Motion, Feature::Deformation, Feature::Opacity, Feature::Absorption]
-        .into_iter()
-        .any(|feature| requirements.has(feature));
+    let hindrances = [
+        Feature::Motion,
+        Feature::Deformation,
+        Feature::Opacity,
+        Feature::Absorption,
+        Feature::NestedDielectrics,
+    ];
+    let hindered = hindrances.into_iter().any(|feature| requirements.has(feature));
     if hindered || settings.clamp_indirect.is_some() { 1 } else { settings.share.clamp(1, 4) }
 }
 
@@ -122,9 +150,16 @@ pub(super) struct Begin<'a> {
 }
 
 impl<'a> Begin<'a> {
-    pub(super) fn tracer<const OPACITY: bool, const ABSORPTION: bool>(
-        &self,
-    ) -> PathTracer<'a, OPACITY, ABSORPTION> {
+    /// What all camera rays begin in, where that is one thing.
+    fn start<I: Inside>(&self) -> Option<I> {
+        if !I::NESTS {
+            return Some(I::new(&SolidStack::default()));
+        }
+        let eye = self.scene.camera.reach();
+        (eye.max - eye.min == Vec3::ZERO).then(|| I::new(&self.scene.nested().around(eye.min, 0.0)))
+    }
+
+    pub(super) fn tracer<const OPACITY: bool, I: Inside>(&self) -> PathTracer<'a, OPACITY, I> {
         PathTracer {
             scene: self.scene,
             max_depth: self.settings.max_depth,
@@ -133,6 +168,7 @@ impl<'a> Begin<'a> {
             clamp_indirect: self.settings.clamp_indirect,
             wants_first_hit: self.first_hit,
             origin: self.origin.0,
+            start: self.start(),
         }
     }
 }
@@ -140,9 +176,9 @@ impl<'a> Begin<'a> {
 /// Renders all tiles; `None` when the control cancelled it.
 ///
 /// Tiles share no pixel, so that the order in which they are merged does not show.
-fn fill<const OPACITY: bool, const ABSORPTION: bool>(
+fn fill<const OPACITY: bool, I: Inside>(
     film: &mut Film,
-    tracer: &PathTracer<OPACITY, ABSORPTION>,
+    tracer: &PathTracer<OPACITY, I>,
     job: &Job,
 ) -> Option<PathCounters> {
     let tiles = film.tiles();
@@ -159,10 +195,10 @@ fn fill<const OPACITY: bool, const ABSORPTION: bool>(
         .try_reduce(PathCounters::default, |a, b| Some(a.plus(b)))
 }
 
-fn render_tile<const OPACITY: bool, const ABSORPTION: bool>(
+fn render_tile<const OPACITY: bool, I: Inside>(
     buffer: TileBuffer,
     tile: Tile,
-    tracer: &PathTracer<OPACITY, ABSORPTION>,
+    tracer: &PathTracer<OPACITY, I>,
     job: &Job,
 ) -> Option<(TileBuffer, PathCounters)> {
     if job.share > 1 {
@@ -173,10 +209,10 @@ fn render_tile<const OPACITY: bool, const ABSORPTION: bool>(
 }
 
 /// Pixel by pixel, each with all its samples.
-fn render_pixels<const OPACITY: bool, const ABSORPTION: bool>(
+fn render_pixels<const OPACITY: bool, I: Inside>(
     mut buffer: TileBuffer,
     tile: Tile,
-    tracer: &PathTracer<OPACITY, ABSORPTION>,
+    tracer: &PathTracer<OPACITY, I>,
     job: &Job,
 ) -> Option<(TileBuffer, PathCounters)> {
     let mut counters = PathCounters::default();
@@ -198,10 +234,10 @@ fn render_pixels<const OPACITY: bool, const ABSORPTION: bool>(
 }
 
 /// Sample by sample, in groups of neighbouring pixels which share their paths.
-fn render_groups<const OPACITY: bool, const ABSORPTION: bool>(
+fn render_groups<const OPACITY: bool, I: Inside>(
     mut buffer: TileBuffer,
     tile: Tile,
-    tracer: &PathTracer<OPACITY, ABSORPTION>,
+    tracer: &PathTracer<OPACITY, I>,
     job: &Job,
 ) -> Option<(TileBuffer, PathCounters)> {
     let mut counters = PathCounters::default();

@@ -15,23 +15,25 @@
 
 use super::SceneView;
 use super::share::{Departure, Landing, SharedPath};
-use super::vertex::Vertex;
+use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
+use crate::build::nesting::Meeting;
 use crate::description::Rgb;
 use crate::extract::{CameraRay, NOTHING};
 use crate::film::{FirstHit, PixelSample};
 use crate::math::{Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
-use crate::shade::Bsdf;
+use crate::shade::nesting::{Inside, NestingFaults};
+use crate::shade::{Bsdf, BsdfSample};
 use glam::{DVec3, Vec2, Vec3};
 
 /// The path tracer with its settings.
 ///
-/// `OPACITY` and `ABSORPTION` say whether the scene requires surfaces with holes and solids which
-/// absorb; without them there is no code for them on the path.
+/// `OPACITY` says whether the scene requires surfaces with holes, and `I` what a path must know of the
+/// solids around it; what is not required has no code on the path.
 #[derive(Clone, Copy)]
-pub struct PathTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
+pub struct PathTracer<'a, const OPACITY: bool, I> {
     /// The scene.
     pub scene: SceneView<'a>,
     /// Greatest number of surface interactions.
@@ -46,6 +48,8 @@ pub struct PathTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
     pub wants_first_hit: bool,
     /// World position of the origin of render space.
     pub origin: DVec3,
+    /// What camera rays begin in; `None` where it depends on the ray.
+    pub start: Option<I>,
 }
 
 /// What happened on the paths of one tile.
@@ -55,13 +59,19 @@ pub struct PathCounters {
     pub rays: u64,
     /// Paths which were cut off at the greatest depth although they still carried something.
     pub truncated: u64,
+    /// Where solids were nested in a way that cannot be.
+    pub nesting: NestingFaults,
 }
 
 impl PathCounters {
     /// The sum of both.
     #[must_use]
     pub fn plus(self, other: Self) -> Self {
-        Self { rays: self.rays + other.rays, truncated: self.truncated + other.truncated }
+        Self {
+            rays: self.rays + other.rays,
+            truncated: self.truncated + other.truncated,
+            nesting: self.nesting.plus(other.nesting),
+        }
     }
 }
 
@@ -75,7 +85,7 @@ pub(super) enum Arrival {
 }
 
 /// A path on its way.
-struct Path<'a> {
+struct Path<'a, I> {
     ray: Ray,
     radiance: Rgb,
     throughput: Rgb,
@@ -83,7 +93,7 @@ struct Path<'a> {
     eta_scale: f32,
     arrival: Arrival,
     first_hit: Option<FirstHit>,
-    inside: u32,
+    inside: I,
     /// Whether a light was drawn already.
     lit: bool,
     /// Surface interactions.
@@ -99,8 +109,8 @@ struct Path<'a> {
     boost: f32,
 }
 
-impl Path<'_> {
-    fn new(camera_ray: &CameraRay) -> Self {
+impl<'a, I> Path<'a, I> {
+    fn new(camera_ray: &CameraRay, inside: I) -> Self {
         Self {
             ray: camera_ray.ray,
             radiance: Rgb::ZERO,
@@ -108,7 +118,7 @@ impl Path<'_> {
             eta_scale: 1.0,
             arrival: Arrival::Sure,
             first_hit: None,
-            inside: NOTHING,
+            inside,
             lit: false,
             depth: 0,
             met: 0,
@@ -123,6 +133,39 @@ impl Path<'_> {
     /// The throughput from the camera on.
     fn carried<const SHARE: bool>(&self) -> Rgb {
         if SHARE { self.throughput * self.throughput_before } else { self.throughput }
+    }
+
+    /// Russian roulette with a number in `[0, 1)`: whether the path goes on, which it then does for
+    /// those that do not.
+    fn survives<const SHARE: bool>(&mut self, u: f32, gain: f32) -> bool {
+        let carried = self.carried::<SHARE>() * self.eta_scale;
+        let survival = (carried.max_element() * gain).min(1.0);
+        if u >= survival || survival.is_nan() {
+            return false;
+        }
+        self.throughput /= survival;
+        if SHARE && self.is_between() {
+            self.boost /= survival;
+        }
+        true
+    }
+
+    /// Goes on behind a surface that is not there for it.
+    fn pass(&mut self, surface: &SurfacePoint) {
+        self.ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, self.ray.d);
+    }
+
+    /// Keeps the first surface which scattered the path at random.
+    fn depart(&mut self, vertex: &Vertex<'a>, sample: &BsdfSample) {
+        if self.departure.is_none() {
+            self.departure = Some(Departure {
+                vertex: vertex.clone(),
+                depth: self.depth,
+                throughput: self.throughput,
+                weight: sample.weight,
+                pdf: sample.pdf,
+            });
+        }
     }
 
     /// Whether the path has just left its departure.
@@ -140,7 +183,13 @@ impl Path<'_> {
     }
 }
 
-impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, ABSORPTION> {
+impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
+    /// What a camera ray begins in.
+    #[inline]
+    pub(super) fn start(&self, ray: &Ray) -> I {
+        self.start.unwrap_or_else(|| I::new(&self.scene.nested().around(ray.o, ray.time)))
+    }
+
     /// The radiance which arrives along a camera ray.
     pub fn sample(
         &self,
@@ -148,7 +197,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> PixelSample {
-        let mut path = Path::new(camera_ray);
+        let mut path = Path::new(camera_ray, self.start(&camera_ray.ray));
         self.follow::<false>(&mut path, camera_ray, sampler, counters);
         PixelSample { radiance: path.radiance, first_hit: path.first_hit }
     }
@@ -160,7 +209,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> SharedPath<'a> {
-        let mut path = Path::new(camera_ray);
+        let mut path = Path::new(camera_ray, self.start(&camera_ray.ray));
         self.follow::<true>(&mut path, camera_ray, sampler, counters);
         let Path { radiance, first_hit, departure, mut landing, before, boost, .. } = path;
         let radiance = match &mut landing {
@@ -180,7 +229,7 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
     /// had begun there, and what it had gathered before is put aside.
     fn follow<const SHARE: bool>(
         &self,
-        path: &mut Path<'a>,
+        path: &mut Path<'a, I>,
         camera_ray: &CameraRay,
         sampler: &Sampler,
         counters: &mut PathCounters,
@@ -190,43 +239,43 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             let from_camera = path.met == 0;
             let Some(hit) = self.scene.geometry.closest_hit(&path.ray, f64::INFINITY, from_camera)
             else {
-                let light = self.infinite(&path.ray, path.arrival);
-                path.radiance += self.limited(path.throughput * light, path.depth);
+                self.escape(path, counters);
                 break;
+            };
+            if I::ABSORBS {
+                path.throughput *= self.transmittance(&path.inside, hit.t);
+            }
+            let met = self.scene.nested().meet(&path.ray, hit, &path.inside, &mut counters.nesting);
+            let (hit, surface, beyond, outside) = match met {
+                Meeting::Surface { hit, surface, beyond, outside } => {
+                    (hit, surface, beyond, outside)
+                }
+                Meeting::Nothing { surface, beyond } => {
+                    path.pass(&surface);
+                    path.inside = beyond;
+                    continue;
+                }
             };
             let dimensions = dimension::vertex(path.met);
             path.met += 1;
-            let surface = self.scene.geometry.surface(&path.ray, &hit);
             let instance = &self.scene.geometry.instances[hit.instance as usize];
             let materials = &self.scene.surfaces.materials;
             let wo = -path.ray.d;
-            if ABSORPTION {
-                path.throughput *= self.transmittance(path.inside, hit.t);
-            }
-            // One number decides whether the ray passes through a hole and, stretched back to the
-            // whole interval, whether the path goes on.
             let mut roulette = None;
             if OPACITY && instance.material != NOTHING {
-                let opacity = materials.opacity(instance.material, surface.uv);
-                if opacity < 1.0 {
-                    let u = sampler.one(dimensions + dimension::ROULETTE);
-                    if u >= opacity {
-                        let SurfacePoint { p, p_error, ng, .. } = surface;
-                        path.ray.o = offset_ray_origin(p, p_error, ng, path.ray.d);
-                        continue;
-                    }
-                    roulette = Some(u / opacity);
-                }
+                let u = || sampler.one(dimensions + dimension::ROULETTE);
+                let Some(left) = materials.stopped(instance.material, surface.uv, u) else {
+                    path.pass(&surface);
+                    continue;
+                };
+                roulette = left;
             }
             if instance.emission != NOTHING {
                 let emitted = self.emitted(&hit, &surface, wo, path.ray.time, path.arrival);
                 path.radiance += self.limited(path.throughput * emitted, path.depth);
             }
             if instance.material == NOTHING {
-                if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
-                    let first = self.first_hit(camera_ray, &path.ray, &hit, &surface, None);
-                    path.first_hit = Some(first);
-                }
+                self.note_first_hit(path, camera_ray, &hit, &surface, None);
                 break;
             }
             let mut lobe = if materials.needs_lobe(instance.material) {
@@ -234,11 +283,12 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             } else {
                 0.0
             };
-            let bsdf = materials.bsdf(instance.material, surface.uv, &mut lobe);
-            if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
-                let first = self.first_hit(camera_ray, &path.ray, &hit, &surface, Some(&bsdf));
-                path.first_hit = Some(first);
-            }
+            let bsdf = if I::NESTS {
+                materials.bsdf_within(instance.material, surface.uv, &mut lobe, outside)
+            } else {
+                materials.bsdf(instance.material, surface.uv, &mut lobe)
+            };
+            self.note_first_hit(path, camera_ray, &hit, &surface, Some(&bsdf));
             if path.depth == self.max_depth {
                 counters.truncated += 1;
                 break;
@@ -247,68 +297,32 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
                 path.land(&surface, wo, &bsdf);
             }
             let vertex = Vertex::new(surface, wo, bsdf);
+            let sides = Sides { here: path.inside, beyond };
             let mut receiver = vertex.receiver();
             let (to_scatter, on_light) =
                 sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
             if vertex.bsdf.has_non_delta() {
-                let lights = &self.scene.lights;
-                let choose = if lights.has_choice() {
-                    sampler.one_fine(dimensions + dimension::LIGHT)
-                } else {
-                    0.0
-                };
-                let mut draw = |receiver: &Receiver, choose: f64, on_light: Vec2| {
-                    let (wi, distance, light) =
-                        self.direct(&vertex, receiver, choose, on_light, path.ray.time, counters);
-                    if ABSORPTION && light != Rgb::ZERO {
-                        let material = instance.material;
-                        let medium = self.medium_towards(wi, &vertex, material, path.inside);
-                        light * self.transmittance(medium, distance)
-                    } else {
-                        light
-                    }
-                };
-                // Where a path is lit first its noise counts most: it draws from the lights at a
-                // place and from the distant ones, later from either.
-                receiver.draws_both = !path.lit && lights.has_both_groups();
-                let light = if receiver.draws_both {
-                    let distant = sampler.two(dimensions + dimension::DISTANT_LIGHT_POINT);
-                    draw(&receiver, 0.5 * choose, distant)
-                        + draw(&receiver, 0.5 + 0.5 * choose, on_light)
-                } else {
-                    draw(&receiver, choose, on_light)
-                };
+                receiver.draws_both = !path.lit && self.scene.lights.has_both_groups();
+                let from = (&vertex, &receiver, &sides);
+                let light =
+                    self.lit_by(from, on_light, dimensions, path.ray.time, sampler, counters);
                 path.lit = true;
                 path.radiance += self.limited(path.throughput * light, path.depth);
             }
             let Some((wi, sample)) = vertex.scatter(lobe, to_scatter) else {
                 break;
             };
-            if SHARE && !sample.delta && path.departure.is_none() {
-                path.departure = Some(Departure {
-                    vertex: vertex.clone(),
-                    depth: path.depth,
-                    throughput: path.throughput,
-                    weight: sample.weight,
-                    pdf: sample.pdf,
-                });
+            if SHARE && !sample.delta {
+                path.depart(&vertex, &sample);
             }
             path.throughput *= sample.weight;
             path.depth += 1;
             path.eta_scale *= sample.eta * sample.eta;
-            if ABSORPTION {
-                path.inside = self.medium_towards(wi, &vertex, instance.material, path.inside);
-            }
+            path.inside = *sides.towards(wi, &vertex);
             if path.depth >= self.roulette_depth {
-                let carried = path.carried::<SHARE>() * path.eta_scale;
-                let survival = (carried.max_element() * self.roulette_gain).min(1.0);
                 let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
-                if u >= survival || survival.is_nan() {
+                if !path.survives::<SHARE>(u, self.roulette_gain) {
                     break;
-                }
-                path.throughput /= survival;
-                if SHARE && path.is_between() {
-                    path.boost /= survival;
                 }
             }
             let SurfacePoint { p, p_error, ng, .. } = vertex.surface;
@@ -319,6 +333,56 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
             } else {
                 Arrival::Drawn { from: receiver, pdf: sample.pdf }
             };
+        }
+    }
+
+    /// Ends a path which meets nothing.
+    fn escape(&self, path: &mut Path<'a, I>, counters: &mut PathCounters) {
+        if I::NESTS {
+            self.scene.nested().escape(&path.inside, &mut counters.nesting);
+        }
+        let light = self.infinite(&path.ray, path.arrival);
+        path.radiance += self.limited(path.throughput * light, path.depth);
+    }
+
+    /// Light straight from a light; where a path is lit first, from a light of each group.
+    ///
+    /// The noise of that first light counts most: so it draws from the lights at a place and from the
+    /// distant ones, where later vertices draw from either.
+    fn lit_by(
+        &self,
+        (vertex, receiver, sides): (&Vertex, &Receiver, &Sides<I>),
+        on_light: Vec2,
+        dimensions: u32,
+        time: f32,
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> Rgb {
+        let choose = if self.scene.lights.has_choice() {
+            sampler.one_fine(dimensions + dimension::LIGHT)
+        } else {
+            0.0
+        };
+        if !receiver.draws_both {
+            return self.direct(vertex, receiver, sides, (choose, on_light), time, counters);
+        }
+        let on_distant = sampler.two(dimensions + dimension::DISTANT_LIGHT_POINT);
+        let (distant, near) = ((0.5 * choose, on_distant), (0.5 + 0.5 * choose, on_light));
+        self.direct(vertex, receiver, sides, distant, time, counters)
+            + self.direct(vertex, receiver, sides, near, time, counters)
+    }
+
+    /// Keeps what the camera ray met first, for the film that wants it.
+    fn note_first_hit(
+        &self,
+        path: &mut Path<'a, I>,
+        camera_ray: &CameraRay,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        bsdf: Option<&Bsdf>,
+    ) {
+        if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
+            path.first_hit = Some(self.first_hit(camera_ray, &path.ray, hit, surface, bsdf));
         }
     }
 
@@ -359,71 +423,71 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         }
     }
 
-    /// Light which arrives straight from a light, by one connection: with its unit direction and its
-    /// distance in metres.
+    /// Light which arrives straight from a light, by one connection to the light and the point on it
+    /// that these numbers draw.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
         receiver: &Receiver,
-        choose: f64,
-        on_light: Vec2,
+        sides: &Sides<I>,
+        (choose, on_light): (f64, Vec2),
         time: f32,
         counters: &mut PathCounters,
-    ) -> (Vec3, f64, Rgb) {
-        const NONE: (Vec3, f64, Rgb) = (Vec3::ZERO, 0.0, Rgb::ZERO);
+    ) -> Rgb {
         let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
-            return NONE;
+            return Rgb::ZERO;
         };
         let (f_cos, pdf) = vertex.evaluate(light.wi);
         if f_cos == Rgb::ZERO {
-            return NONE;
+            return Rgb::ZERO;
         }
         let (shadow_ray, end) = light.shadow_ray(receiver, time);
         counters.rays += 1;
-        let visible = self.visible(&shadow_ray, end);
+        let inside = sides.towards(light.wi, vertex);
+        let visible = self.visible(&shadow_ray, end, inside);
         if visible == 0.0 {
-            return NONE;
+            return Rgb::ZERO;
         }
         let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
-        let distance = end * shadow_ray.d.as_dvec3().length();
-        (light.wi, distance, f_cos * light.radiance * (visible * weight / light.pdf))
-    }
-
-    /// The material of the solid in which a path goes on from a vertex in the direction `wi`, when it
-    /// arrived inside `inside`; [`NOTHING`] outside.
-    pub(super) fn medium_towards(
-        &self,
-        wi: Vec3,
-        vertex: &Vertex,
-        material: u32,
-        inside: u32,
-    ) -> u32 {
-        if !vertex.crosses(wi) || !self.scene.surfaces.materials.is_dielectric(material) {
-            return inside;
+        let arriving = f_cos * light.radiance * (visible * weight / light.pdf);
+        if I::ABSORBS && arriving != Rgb::ZERO {
+            let distance = end * shadow_ray.d.as_dvec3().length();
+            arriving * self.transmittance(inside, distance)
+        } else {
+            arriving
         }
-        let entering = wi.dot(vertex.surface.ng) < 0.0;
-        if entering { material } else { NOTHING }
     }
 
-    /// Share of the light which passes along a segment.
-    pub(super) fn visible(&self, shadow_ray: &Ray, end: f64) -> f32 {
-        if !OPACITY {
+    /// Share of the light which passes along a segment that begins inside `inside`, absorption apart.
+    pub(super) fn visible(&self, shadow_ray: &Ray, end: f64, inside: &I) -> f32 {
+        if !OPACITY && !I::NESTS {
             return if self.scene.geometry.occluded(shadow_ray, end) { 0.0 } else { 1.0 };
         }
-        // Holes let a share of the light through: follow the segment from surface to surface.
+        // Holes let a share of the light through, and surfaces inside of other solids all of it: follow the
+        // segment from surface to surface. What is found wrong is counted on the paths.
+        let (mut inside, mut faults) = (*inside, NestingFaults::default());
         let mut passed = 1.0;
         let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
         let mut ray = *shadow_ray;
         while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
-            let material = self.scene.geometry.instances[hit.instance as usize].material;
-            if material == NOTHING || !self.scene.surfaces.materials.has_opacity(material) {
-                return 0.0;
-            }
-            let surface = self.scene.geometry.surface(&ray, &hit);
-            passed *= 1.0 - self.scene.surfaces.materials.opacity(material, surface.uv);
-            if passed == 0.0 {
-                return 0.0;
-            }
+            let surface = match self.scene.nested().meet(&ray, hit, &inside, &mut faults) {
+                Meeting::Nothing { surface, beyond } => {
+                    inside = beyond;
+                    surface
+                }
+                Meeting::Surface { hit, surface, .. } => {
+                    let material = self.scene.geometry.instances[hit.instance as usize].material;
+                    let materials = &self.scene.surfaces.materials;
+                    if material == NOTHING || !materials.has_opacity(material) {
+                        return 0.0;
+                    }
+                    passed *= 1.0 - materials.opacity(material, surface.uv);
+                    if passed == 0.0 {
+                        return 0.0;
+                    }
+                    surface
+                }
+            };
             ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
             if end.is_finite() {
                 ray.d = (target - ray.o.as_dvec3()).as_vec3();
@@ -435,17 +499,11 @@ impl<'a, const OPACITY: bool, const ABSORPTION: bool> PathTracer<'a, OPACITY, AB
         passed
     }
 
-    /// Beer and Lambert's law inside a solid of this material over a distance in metres; 1 outside.
-    pub(super) fn transmittance(&self, material: u32, distance: f64) -> Rgb {
-        if material == NOTHING {
-            return Rgb::ONE;
-        }
-        match self.scene.surfaces.materials.attenuation(material) {
-            // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
-            Some(sigma_a) => sigma_a
-                .map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() }),
-            None => Rgb::ONE,
-        }
+    /// Share of the light which is left after a distance in metres, [`MaterialTable::transmittance`].
+    ///
+    /// [`MaterialTable::transmittance`]: crate::shade::MaterialTable::transmittance
+    pub(super) fn transmittance(&self, inside: &I, distance: f64) -> Rgb {
+        self.scene.surfaces.materials.transmittance(inside.medium(), distance)
     }
 
     /// The knob `clamp_indirect`; what the camera or its first surface sees is never limited.

@@ -12,7 +12,7 @@
 //! variance and the record of the frame are the same as of any other integrator.
 
 use super::eye::{EyeTracer, Gathered, Maps, SampleKey};
-use super::film_pass::{Begin, IntegrateStatus, Job};
+use super::film_pass::{Around, Begin, IntegrateStatus, Job};
 use super::radius::{PixelRadius, shrunk_by_passes};
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
@@ -25,11 +25,13 @@ use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
 use crate::film::{Film, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::sampling::{Sampler, dimension};
+use crate::shade::nesting::{Clear, Inside, NestingFaults, OneSolid, SolidStack};
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::marker::PhantomData;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
 
@@ -47,6 +49,7 @@ pub struct PhotonScratch {
     store: PhotonStore,
     global: PhotonMap,
     caustics: PhotonMap,
+    faults: NestingFaults,
 }
 
 /// What the photons of a frame came to.
@@ -134,16 +137,23 @@ pub fn render_film_with_photons(
         }
     };
     let scene = tables.view();
-    let requires = |feature| scene.requirements.has(feature);
     let job = Job::new(settings, &scene, clock.frame, &control);
     let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
     let setting = Setting::new(&scene, &job, chosen.method, &source);
     let scratch = &mut *scratch;
-    let done = match (requires(Feature::Opacity), requires(Feature::Absorption)) {
-        (false, false) => setting.fill(&mut film, begin.tracer::<false, false>(), scratch),
-        (false, true) => setting.fill(&mut film, begin.tracer::<false, true>(), scratch),
-        (true, false) => setting.fill(&mut film, begin.tracer::<true, false>(), scratch),
-        (true, true) => setting.fill(&mut film, begin.tracer::<true, true>(), scratch),
+    let opaque = !scene.requirements.has(Feature::Opacity);
+    let film_mut = &mut film;
+    let done = match (opaque, Around::new(scene.requirements)) {
+        (true, Around::Clear) => setting.fill(film_mut, begin.tracer::<false, Clear>(), scratch),
+        (true, Around::One) => setting.fill(film_mut, begin.tracer::<false, OneSolid>(), scratch),
+        (true, Around::Nested) => {
+            setting.fill(film_mut, begin.tracer::<false, SolidStack>(), scratch)
+        }
+        (false, Around::Clear) => setting.fill(film_mut, begin.tracer::<true, Clear>(), scratch),
+        (false, Around::One) => setting.fill(film_mut, begin.tracer::<true, OneSolid>(), scratch),
+        (false, Around::Nested) => {
+            setting.fill(film_mut, begin.tracer::<true, SolidStack>(), scratch)
+        }
     };
     if let Some((counters, report)) = done {
         status.film = Some(film);
@@ -215,10 +225,9 @@ impl<'a> Setting<'a> {
         (self.method != Method::PathWithPhotons || self.casts) && self.storable.contains(&true)
     }
 
-    fn tracer<const O: bool, const A: bool>(&self, keep: Keep) -> PhotonTracer<'_, O, A> {
+    fn tracer<const O: bool, I: Inside>(&self, keep: Keep) -> PhotonTracer<'_, O, I> {
         PhotonTracer {
-            geometry: self.scene.geometry,
-            materials: &self.scene.surfaces.materials,
+            scene: self.scene.nested(),
             lights: self.scene.lights,
             source: self.source,
             aim: self.aim.as_ref().filter(|_| keep == Keep::Caustics),
@@ -226,6 +235,7 @@ impl<'a> Setting<'a> {
             min_alpha: self.job.settings.photons.min_alpha(),
             max_depth: self.job.settings.max_depth,
             keep,
+            inside: PhantomData,
         }
     }
 
@@ -246,7 +256,7 @@ impl<'a> Setting<'a> {
     }
 
     /// How many photons a pass emits: as many as asked for, unless the memory does not suffice.
-    fn plan<const O: bool, const A: bool>(&self, scratch: &mut PhotonScratch) -> PhotonReport {
+    fn plan<const O: bool, I: Inside>(&self, scratch: &mut PhotonScratch) -> PhotonReport {
         let settings = self.job.settings;
         let aimed = self.method == Method::PathWithPhotons && self.aim.is_some();
         let asked = settings.photons.emitted(settings.size, aimed);
@@ -255,7 +265,7 @@ impl<'a> Setting<'a> {
         let keeps = [self.global_keep(), self.has_caustic_map().then_some(Keep::Caustics)];
         let mut kept: u64 = 0;
         for keep in keeps.into_iter().flatten() {
-            let tracer = self.tracer::<O, A>(keep);
+            let tracer = self.tracer::<O, I>(keep);
             let counters = tracer.trace_pass(&pilot, &mut scratch.store, &self.job.control.cancel);
             kept += counters.map_or(0, |counters| counters.stored);
         }
@@ -292,23 +302,25 @@ impl<'a> Setting<'a> {
     }
 
     /// Traces the photons of a pass and builds its maps.
-    fn prepare<const O: bool, const A: bool>(
+    fn prepare<const O: bool, I: Inside>(
         &self,
         pass: &PhotonPass,
         scratch: &mut PhotonScratch,
         report: &mut PhotonReport,
     ) -> Option<()> {
         let cancel = &self.job.control.cancel;
+        let mut faults = scratch.faults;
         let mut take =
             |keep: Keep, store: &mut PhotonStore, map: &mut PhotonMap, wanted: Wanted| {
                 let start = Instant::now();
                 let counters: PhotonCounters =
-                    self.tracer::<O, A>(keep).trace_pass(pass, store, cancel)?;
+                    self.tracer::<O, I>(keep).trace_pass(pass, store, cancel)?;
                 let traced = Instant::now();
                 map.rebuild(store, |photon| wanted == Wanted::All || !photon.caustic);
                 report.trace_seconds += (traced - start).as_secs_f64();
                 report.build_seconds += traced.elapsed().as_secs_f64();
                 report.emitted += counters.emitted;
+                faults = faults.plus(counters.nesting);
                 report.stored += counters.stored;
                 self.job.control.rays.fetch_add(counters.rays, Relaxed);
                 Some(map.len() as u64)
@@ -325,19 +337,21 @@ impl<'a> Setting<'a> {
                 take(Keep::Caustics, &mut scratch.store, &mut scratch.caustics, Wanted::All)?;
             report.caustics = report.caustics.max(stored);
         }
+        scratch.faults = faults;
         let memory = scratch.store.memory() + scratch.global.memory() + scratch.caustics.memory();
         report.memory_bytes = report.memory_bytes.max(memory as u64);
         Some(())
     }
 
     /// Renders all passes; `None` when the control cancelled it.
-    fn fill<const O: bool, const A: bool>(
+    fn fill<const O: bool, I: Inside>(
         &self,
         film: &mut Film,
-        path: PathTracer<'a, O, A>,
+        path: PathTracer<'a, O, I>,
         scratch: &mut PhotonScratch,
     ) -> Option<(PathCounters, PhotonReport)> {
-        let mut report = self.plan::<O, A>(scratch);
+        scratch.faults = NestingFaults::default();
+        let mut report = self.plan::<O, I>(scratch);
         let mut tiles: Vec<TileState> =
             film.tiles().into_iter().map(|tile| TileState::new(film, tile)).collect();
         let samples = self.job.settings.samples;
@@ -353,7 +367,7 @@ impl<'a> Setting<'a> {
         for group in 0..groups {
             let time = self.time(group);
             let pass = self.photon_pass(group, report.per_pass, time);
-            self.prepare::<O, A>(&pass, scratch, &mut report)?;
+            self.prepare::<O, I>(&pass, scratch, &mut report)?;
             let start = Instant::now();
             let tracer = self.eye(path, scratch, time);
             let passes = group * each..(group * each + each).min(samples);
@@ -362,7 +376,7 @@ impl<'a> Setting<'a> {
             })?;
             report.gather_seconds += start.elapsed().as_secs_f64();
         }
-        let mut counters = PathCounters::default();
+        let mut counters = PathCounters { nesting: scratch.faults, ..PathCounters::default() };
         for tile in tiles {
             counters = counters.plus(tile.counters);
             let Gathered { radii, unresolved, .. } = tile.gathered;
@@ -377,12 +391,12 @@ impl<'a> Setting<'a> {
         Some((counters, report))
     }
 
-    fn eye<'b, const O: bool, const A: bool>(
+    fn eye<'b, const O: bool, I: Inside>(
         &'b self,
-        path: PathTracer<'b, O, A>,
+        path: PathTracer<'b, O, I>,
         scratch: &'b PhotonScratch,
         time: f32,
-    ) -> EyeTracer<'b, O, A> {
+    ) -> EyeTracer<'b, O, I> {
         let settings = self.job.settings;
         let (side, growth) = self.scene.camera.pixel_size(time);
         let reach = self.source.reach.map_or(f64::INFINITY, |reach| reach.radius);
@@ -418,9 +432,9 @@ impl TileState {
     }
 
     /// One sample for each pixel; `None` when the control cancelled it.
-    fn add_pass<const O: bool, const A: bool>(
+    fn add_pass<const O: bool, I: Inside>(
         &mut self,
-        tracer: &EyeTracer<O, A>,
+        tracer: &EyeTracer<O, I>,
         setting: &Setting,
         pass: u32,
         time: f32,

@@ -2,6 +2,7 @@
 
 use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
 use crate::build::light::{LightTable, Lights, ShapeLights};
+use crate::build::nesting::{NestedGeometry, Solids};
 use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
@@ -18,6 +19,7 @@ pub struct SceneTables<'w> {
     punctual: Res<'w, PunctualLights>,
     camera: Res<'w, ViewCamera>,
     requirements: Res<'w, Requirements>,
+    solids: Res<'w, Solids>,
 }
 
 /// The scene of a frame: arrays and indices, read-only.
@@ -33,6 +35,20 @@ pub struct SceneView<'a> {
     pub camera: &'a ViewCamera,
     /// What the scene needs.
     pub requirements: &'a Requirements,
+    /// Which solids may overlap.
+    pub solids: &'a Solids,
+}
+
+impl<'a> SceneView<'a> {
+    /// What rays meet which know what they are inside of.
+    #[inline]
+    pub fn nested(&self) -> NestedGeometry<'a> {
+        NestedGeometry {
+            geometry: self.geometry,
+            materials: &self.surfaces.materials,
+            solids: self.solids,
+        }
+    }
 }
 
 impl SceneTables<'_> {
@@ -55,6 +71,7 @@ impl SceneTables<'_> {
             },
             camera: &self.camera,
             requirements: &self.requirements,
+            solids: &self.solids,
         }
     }
 }

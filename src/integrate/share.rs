@@ -29,6 +29,7 @@ use crate::build::light::{Receiver, ShadowEnd, shadow_ray};
 use crate::description::Rgb;
 use crate::film::PixelSample;
 use crate::shade::Bsdf;
+use crate::shade::nesting::{Inside, SolidStack};
 use glam::{DVec3, Vec3};
 
 /// A path with what its neighbours may use.
@@ -109,7 +110,7 @@ struct Connection {
     density: f64,
 }
 
-impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORPTION> {
+impl<const OPACITY: bool, I: Inside> PathTracer<'_, OPACITY, I> {
     /// Adds to each path of a group what leaves all its landings.
     ///
     /// `GROUP` is at least the number of paths.
@@ -179,7 +180,8 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PathTracer<'_, OPACITY, ABSORP
         let end = ShadowEnd::Surface { p: landing.p, p_error: landing.p_error, n: landing.ng };
         let (ray, t_max) = shadow_ray(&receiver, wi, &end, 0.0);
         counters.rays += 1;
-        (self.visible(&ray, t_max) > 0.0).then(|| Connection {
+        let outside = I::new(&SolidStack::default());
+        (self.visible(&ray, t_max, &outside) > 0.0).then(|| Connection {
             path,
             value: from.throughput * f_cos,
             geometry,

@@ -11,6 +11,22 @@ use crate::math::Frame;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
 
+/// What is on either side of a surface that a path has reached.
+#[derive(Clone, Copy)]
+pub(super) struct Sides<I> {
+    /// On the side from which it came.
+    pub(super) here: I,
+    pub(super) beyond: I,
+}
+
+impl<I> Sides<I> {
+    /// Where a path is that leaves in the direction `wi`.
+    #[inline]
+    pub(super) fn towards(&self, wi: Vec3, vertex: &Vertex) -> &I {
+        if vertex.crosses(wi) { &self.beyond } else { &self.here }
+    }
+}
+
 /// A point on a path.
 #[derive(Clone)]
 pub(super) struct Vertex<'a> {

@@ -11,8 +11,10 @@ use super::bsdf::{
     coat_table, dielectric_average, glass_table, reflector_table, reflector_table_at,
 };
 use super::metals;
+use super::relative::RelativeTables;
 use super::texture::{self, RenderTexture};
 use crate::description::{Material, Rgb, Value};
+use crate::extract::NOTHING;
 use glam::Vec2;
 use std::collections::HashMap;
 
@@ -28,6 +30,8 @@ pub struct MaterialTable {
     coats: Vec<AlbedoTable<1>>,
     glasses: Vec<AlbedoTable<2>>,
     reflectors: Vec<ReflectorTable>,
+    /// Rough interfaces to other media than air.
+    relative: RelativeTables,
 }
 
 /// What is inside a solid dielectric.
@@ -37,6 +41,8 @@ pub struct Interior {
     pub ior: f32,
     /// Absorption coefficient per metre; `None` is perfectly clear.
     pub sigma_a: Option<Rgb>,
+    /// Where solids overlap, the one of the highest priority is there.
+    pub priority: i32,
 }
 
 /// A [`Material`] with all that does not depend on the point resolved.
@@ -111,7 +117,7 @@ enum MetalColor {
 
 /// Width `α` of the microfacets.
 #[derive(Clone, Copy, Debug)]
-enum Width {
+pub(super) enum Width {
     Smooth,
     Constant(f32),
     /// The texture holds the roughness.
@@ -119,7 +125,7 @@ enum Width {
 }
 
 impl Width {
-    fn new(roughness: Value<f32, u32>) -> Self {
+    pub(super) fn new(roughness: Value<f32, u32>) -> Self {
         match roughness {
             Value::Constant(roughness) => match alpha(roughness) {
                 Some(alpha) => Self::Constant(alpha),
@@ -142,7 +148,7 @@ impl Width {
         }
     }
 
-    fn widths(self) -> Option<Widths> {
+    pub(super) fn widths(self) -> Option<Widths> {
         match self {
             Self::Smooth => None,
             Self::Constant(alpha) => Some(Widths::One(alpha)),
@@ -153,7 +159,7 @@ impl Width {
 
 /// The GGX width of a perceptual roughness; `None` is smooth.
 #[inline]
-fn alpha(roughness: f32) -> Option<f32> {
+pub(super) fn alpha(roughness: f32) -> Option<f32> {
     let roughness = roughness.clamp(0.0, 1.0);
     let alpha = roughness * roughness;
     (alpha >= SMOOTH_BELOW_ALPHA).then_some(alpha)
@@ -203,6 +209,7 @@ impl MaterialTable {
             coats: Vec::new(),
             glasses: Vec::new(),
             reflectors: Vec::new(),
+            relative: RelativeTables::new(materials),
         };
         let mut known = KnownTables::default();
         let kinds: Vec<Kind> =
@@ -316,6 +323,37 @@ impl MaterialTable {
         }
     }
 
+    /// Like [`MaterialTable::bsdf`] for a surface which has a solid of the material `outside` on its
+    /// outside, or air where that is `None`.
+    pub fn bsdf_within(
+        &self,
+        material: u32,
+        uv: Vec2,
+        u_lobe: &mut f32,
+        outside: Option<u32>,
+    ) -> Bsdf<'_> {
+        let Some(index) = outside.and_then(|outside| self.interior(outside)) else {
+            return self.bsdf(material, uv, u_lobe);
+        };
+        match &self.materials[material as usize].kind {
+            Kind::Dielectric { eta, .. } => {
+                let eta = eta / index.ior;
+                let Some(pair) = self.relative.find(material, index.ior) else {
+                    return Bsdf::SmoothDielectric(SmoothDielectric { eta });
+                };
+                let roughness =
+                    |texture: u32| texture::scalar(&self.textures[texture as usize], uv);
+                pair.bsdf(eta, roughness)
+            }
+            Kind::Mix { a, b, amount } => {
+                let side = self.choose_side(*a, *b, *amount, uv, u_lobe);
+                self.bsdf_within(side, uv, u_lobe, outside)
+            }
+            Kind::Masked { material, .. } => self.bsdf_within(*material, uv, u_lobe, outside),
+            _ => self.bsdf(material, uv, u_lobe),
+        }
+    }
+
     /// Share of the rays which the surface stops, in `[0, 1]`: 1 unless it is masked.
     #[inline]
     pub fn opacity(&self, material: u32, uv: Vec2) -> f32 {
@@ -333,6 +371,20 @@ impl MaterialTable {
             }
             _ => 1.0,
         }
+    }
+
+    /// Whether a surface stops a ray: `None` where it passes through a hole.
+    ///
+    /// One number decides that and, stretched back to the whole interval `[0, 1)`, is left for another
+    /// choice; where nothing is to be decided it is not drawn.
+    #[inline]
+    pub fn stopped(&self, material: u32, uv: Vec2, u: impl FnOnce() -> f32) -> Option<Option<f32>> {
+        let opacity = self.opacity(material, uv);
+        if opacity >= 1.0 {
+            return Some(None);
+        }
+        let u = u();
+        (u < opacity).then(|| Some(u / opacity))
     }
 
     /// Whether [`MaterialTable::opacity`] can be other than 1.
@@ -401,6 +453,19 @@ impl MaterialTable {
     #[inline]
     pub fn attenuation(&self, material: u32) -> Option<Rgb> {
         self.interior(material).and_then(|interior| interior.sigma_a)
+    }
+
+    /// Beer and Lambert's law: the share of light left after a distance in metres inside a solid of this
+    /// material; 1 in air ([`NOTHING`]).
+    #[inline]
+    pub fn transmittance(&self, material: u32, distance: f64) -> Rgb {
+        if material == NOTHING {
+            return Rgb::ONE;
+        }
+        // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
+        self.attenuation(material).map_or(Rgb::ONE, |sigma_a| {
+            sigma_a.map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() })
+        })
     }
 
     /// Whether light can be inside the object: [`MaterialTable::interior`] is something.
@@ -484,7 +549,7 @@ impl MaterialTable {
 }
 
 /// The width of a rough dielectric, or smooth where its transmitted lobe could not be resolved.
-fn glass_width(eta: f32, width: Width) -> Width {
+pub(super) fn glass_width(eta: f32, width: Width) -> Width {
     let strength = (eta - 1.0).abs();
     let resolved = match width {
         Width::Smooth => false,
@@ -539,9 +604,10 @@ fn needs_lobe(index: u32, kinds: &[Kind]) -> bool {
 
 fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
     match &materials[index as usize] {
-        Material::Dielectric { ior, attenuation, .. } => Some(Interior {
+        Material::Dielectric { ior, attenuation, priority, .. } => Some(Interior {
             ior: *ior,
             sigma_a: attenuation.map(|attenuation| attenuation.sigma_a()),
+            priority: *priority,
         }),
         Material::Masked { material, .. } => interior(*material, materials),
         Material::Mix { a, b, .. } => interior(*a, materials).or_else(|| interior(*b, materials)),
@@ -615,7 +681,7 @@ mod tests {
     }
 
     fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Material<u32> {
-        Material::Dielectric { ior: 1.5, roughness, attenuation }
+        Material::Dielectric { ior: 1.5, roughness, attenuation, priority: 0 }
     }
 
     fn red(bsdf: &Bsdf) -> f32 {
@@ -705,7 +771,7 @@ mod tests {
             let left = (-sigma_a * 0.02).exp();
             assert!((left - color).abs().max_element() < 1e-6, "{left}");
         }
-        assert_eq!(table.interior(2), Some(Interior { ior: 1.5, sigma_a: None }));
+        assert_eq!(table.interior(2), Some(Interior { ior: 1.5, sigma_a: None, priority: 0 }));
         assert_eq!(table.attenuation(2), None);
         assert!(table.is_dielectric(2) && !table.is_dielectric(3));
     }

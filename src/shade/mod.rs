@@ -12,6 +12,8 @@
 mod bsdf;
 mod material;
 mod metals;
+pub mod nesting;
+mod relative;
 pub mod texture;
 
 pub use bsdf::{

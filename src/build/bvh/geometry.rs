@@ -93,6 +93,22 @@ impl SceneGeometry<'_> {
         blocked
     }
 
+    /// The nearest hit of one instance with `0 < t < t_max`, whatever else is there. For a mesh which
+    /// is in the tree of resting meshes `tree` is one of its own.
+    pub(crate) fn hit_of(
+        &self,
+        index: u32,
+        tree: Option<&MeshTree>,
+        ray: &Ray,
+        t_max: f64,
+    ) -> Option<Hit> {
+        let instance = &self.instances[index as usize];
+        let Some(tree) = tree else { return self.hit_instance(index, instance, ray, t_max) };
+        let hit = tree.closest_hit(&to_instance(instance, ray), ray.time, t_max)?;
+        let (primitive, weights) = (hit.triangle, hit.weights);
+        Some(Hit { t: hit.t, instance: index, primitive, weights })
+    }
+
     /// The nearest hit of one instance with `0 < t < t_max`.
     #[inline]
     fn hit_instance(&self, index: u32, instance: &Instance, ray: &Ray, t_max: f64) -> Option<Hit> {

@@ -64,6 +64,16 @@ impl MeshTree {
         Self { mesh, later: Arc::default(), tree: Tree::Elsewhere, quality }
     }
 
+    /// Whether no ray looks for it here.
+    pub(crate) fn is_elsewhere(&self) -> bool {
+        matches!(self.tree, Tree::Elsewhere)
+    }
+
+    /// How its tree was built.
+    pub(crate) fn quality(&self) -> BvhQuality {
+        self.quality
+    }
+
     /// Whether it deforms while the shutter is open.
     #[inline]
     pub fn deforms(&self) -> bool {

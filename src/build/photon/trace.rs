@@ -22,15 +22,18 @@
 //! drawn.
 
 use super::Photon;
-use crate::build::bvh::{SceneGeometry, SurfacePoint};
+use crate::build::bvh::SurfacePoint;
 use crate::build::light::{Aim, EmittedPhoton, Lights, PhotonNumbers, PhotonSource};
+use crate::build::nesting::{Meeting, NestedGeometry};
 use crate::description::Rgb;
 use crate::extract::NOTHING;
 use crate::math::{Frame, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
-use crate::shade::{Bsdf, BsdfSample, MaterialTable, TransportMode};
+use crate::shade::nesting::{Inside, NestingFaults, SolidStack};
+use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
+use std::marker::PhantomData;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -76,6 +79,8 @@ pub struct PhotonCounters {
     pub rays: u64,
     /// Photons given up at the greatest depth although they still carried something.
     pub truncated: u64,
+    /// Where solids were nested in a way that cannot be.
+    pub nesting: NestingFaults,
 }
 
 impl PhotonCounters {
@@ -87,6 +92,7 @@ impl PhotonCounters {
             stored: self.stored + other.stored,
             rays: self.rays + other.rays,
             truncated: self.truncated + other.truncated,
+            nesting: self.nesting.plus(other.nesting),
         }
     }
 }
@@ -130,11 +136,9 @@ impl PhotonStore {
 
 /// Traces photons. The generic parameters are those of the path tracer.
 #[derive(Clone, Copy)]
-pub struct PhotonTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
+pub struct PhotonTracer<'a, const OPACITY: bool, I> {
     /// What photons meet.
-    pub geometry: SceneGeometry<'a>,
-    /// What it is made of.
-    pub materials: &'a MaterialTable,
+    pub scene: NestedGeometry<'a>,
     /// What shines.
     pub lights: Lights<'a>,
     /// From where photons start.
@@ -149,9 +153,11 @@ pub struct PhotonTracer<'a, const OPACITY: bool, const ABSORPTION: bool> {
     pub max_depth: u32,
     /// Which photons are kept.
     pub keep: Keep,
+    /// What a path must know of the solids around it.
+    pub inside: PhantomData<I>,
 }
 
-impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSORPTION> {
+impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
     /// Traces the photons of a pass into `store`, in parallel; the photons and their order do not
     /// depend on the threads. `None` when `cancel` was set.
     pub fn trace_pass(
@@ -211,24 +217,42 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSO
         counters: &mut PhotonCounters,
     ) {
         let EmittedPhoton { mut ray, mut power } = photon;
-        let mut inside = NOTHING;
+        let PhotonTracer { scene: NestedGeometry { geometry, materials, .. }, .. } = *self;
+        let mut inside = I::new(&if I::NESTS {
+            self.scene.around(ray.o, ray.time)
+        } else {
+            SolidStack::default()
+        });
         // Surface interactions, and surfaces met: those which let the photon pass count only here.
         let mut depth = 0;
         let mut met = 0;
         let mut only_specular = true;
         loop {
             counters.rays += 1;
-            let Some(hit) = self.geometry.closest_hit(&ray, f64::INFINITY, false) else { return };
-            let material = self.geometry.instances[hit.instance as usize].material;
+            let Some(hit) = geometry.closest_hit(&ray, f64::INFINITY, false) else {
+                self.scene.escape(&inside, &mut counters.nesting);
+                return;
+            };
+            if I::ABSORBS {
+                power *= materials.transmittance(inside.medium(), hit.t);
+            }
+            let meeting = self.scene.meet(&ray, hit, &inside, &mut counters.nesting);
+            let (hit, surface, beyond, outside) = match meeting {
+                Meeting::Surface { hit, surface, beyond, outside } => {
+                    (hit, surface, beyond, outside)
+                }
+                Meeting::Nothing { surface, beyond } => {
+                    ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                    inside = beyond;
+                    continue;
+                }
+            };
+            let material = geometry.instances[hit.instance as usize].material;
             if material == NOTHING {
                 return;
             }
-            if ABSORPTION {
-                power *= transmittance(self.materials, inside, hit.t);
-            }
             let dimensions = dimension::vertex(met);
             met += 1;
-            let surface = self.geometry.surface(&ray, &hit);
             let caustic = only_specular && depth > 0;
             let kept = match self.keep {
                 Keep::All => true,
@@ -240,7 +264,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSO
             }
             let mut roulette = None;
             if OPACITY {
-                let opacity = self.materials.opacity(material, surface.uv);
+                let opacity = materials.opacity(material, surface.uv);
                 if opacity < 1.0 {
                     let u = sampler.one(dimensions + dimension::ROULETTE);
                     if u >= opacity {
@@ -256,7 +280,7 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSO
                 return;
             }
             let mut lobe = sampler.one(dimensions + dimension::LOBE);
-            let bsdf = self.materials.bsdf(material, surface.uv, &mut lobe);
+            let bsdf = materials.bsdf_within(material, surface.uv, &mut lobe, outside);
             let storable = bsdf.is_storable(self.min_alpha);
             if self.keep == Keep::Caustics && matches!(bsdf, Bsdf::Diffuse(_)) {
                 return;
@@ -277,8 +301,8 @@ impl<const OPACITY: bool, const ABSORPTION: bool> PhotonTracer<'_, OPACITY, ABSO
             }
             power /= survival;
             depth += 1;
-            if ABSORPTION {
-                inside = scattering.medium_towards(self.materials, wi, material, inside);
+            if scattering.crosses(wi) {
+                inside = beyond;
             }
             let surface = &scattering.surface;
             ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
@@ -357,28 +381,4 @@ impl<'a> Scattering<'a> {
         let ratio = (self.wo.dot(ns) * wi.dot(ng)) / (self.wo.dot(ng) * wi.dot(ns));
         if ratio.is_finite() { ratio.abs() } else { 0.0 }
     }
-
-    fn medium_towards(
-        &self,
-        materials: &MaterialTable,
-        wi: Vec3,
-        material: u32,
-        inside: u32,
-    ) -> u32 {
-        if !self.crosses(wi) || !materials.is_dielectric(material) {
-            return inside;
-        }
-        if wi.dot(self.surface.ng) < 0.0 { material } else { NOTHING }
-    }
-}
-
-/// Beer and Lambert's law inside a solid of this material over a distance in metres; 1 outside.
-fn transmittance(materials: &MaterialTable, material: u32, distance: f64) -> Rgb {
-    if material == NOTHING {
-        return Rgb::ONE;
-    }
-    materials.attenuation(material).map_or(Rgb::ONE, |sigma_a| {
-        // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
-        sigma_a.map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() })
-    })
 }

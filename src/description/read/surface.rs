@@ -125,7 +125,7 @@ pub(super) fn read_material(
         Material::Mirror { reflectance } => {
             check.color("reflectance", reflectance, &limits::SHARE);
         }
-        Material::Dielectric { ior, roughness, attenuation } => {
+        Material::Dielectric { ior, roughness, attenuation, priority: _ } => {
             check.number("ior", *ior, &limits::IOR);
             check.scalar("roughness", roughness);
             if let Some(attenuation) = attenuation {

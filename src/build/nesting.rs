@@ -1,0 +1,326 @@
+//! Solids which may overlap: what a ray meets at their surfaces, and what it begins in.
+//!
+//! [`SolidStack`] has the rule of what is where. Here the surfaces come in.
+//!
+//! # Surfaces at the same place
+//! Water fills a glass to its wall: two surfaces at one place, which rounding puts into any order, and of
+//! which the next ray, beginning beyond the rounding bound of the one it met, may miss the other. So
+//! where a ray meets a solid, the surfaces of all others which lie within the bound are met with it: those
+//! between the origins of rays which leave on the one and on the other side. The ray passes all of them
+//! or none. The bound is that of the point four times: the other surface has one of its own, and either
+//! has corners which were rounded when they were written down.
+//!
+//! # Where a ray begins
+//! A solid is around a point if a ray straight up from there leaves it before it enters it. That is also
+//! right for water whose only surface is that on top, if nothing else lies between.
+
+use super::bvh::{Hit, MeshTree, MeshTrees, SceneGeometry, SurfacePoint};
+use crate::extract::{Geometry, Instances, NOTHING, Surfaces, overlapping_pairs, solids};
+use crate::math::{Aabb, Ray, offset_ray_origin};
+use crate::shade::MaterialTable;
+use crate::shade::nesting::{Inside, NestingFaults, Solid, SolidStack};
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use std::sync::Arc;
+
+/// How much wider than the rounding bound of a point other surfaces count as being at the same place.
+const SAME_PLACE: f64 = 4.0;
+/// Surfaces of other solids which can lie at the same place.
+const MOST_AT_ONCE: usize = 7;
+
+/// All solids of a frame, where the scene requires that they nest.
+#[derive(Resource, Clone, Debug, Default)]
+pub struct Solids {
+    list: Vec<Entry>,
+    /// For each instance its place in the list, or [`NOTHING`].
+    places: Vec<u32>,
+    /// Places of those which overlap an entry, entry by entry.
+    neighbours: Vec<u32>,
+}
+
+#[derive(Clone, Debug)]
+struct Entry {
+    solid: Solid,
+    bounds: Aabb,
+    is_mesh: bool,
+    /// The tree of a mesh which has none of its own, being in that of the resting meshes.
+    tree: Option<Arc<MeshTree>>,
+    /// First and last of its neighbours.
+    neighbours: (u32, u32),
+}
+
+/// What a ray has met, when the solids around it are taken into account.
+#[derive(Clone, Copy, Debug)]
+pub enum Meeting<I> {
+    /// A surface inside a solid of higher priority: the ray goes straight on from here.
+    Nothing {
+        /// Where it goes on.
+        surface: SurfacePoint,
+        /// What is beyond.
+        beyond: I,
+    },
+    /// A surface.
+    Surface {
+        /// The hit which counts.
+        hit: Hit,
+        /// The surface there.
+        surface: SurfacePoint,
+        /// What is beyond.
+        beyond: I,
+        /// Material on the outside of the surface; `None` is air.
+        outside: Option<u32>,
+    },
+}
+
+/// A surface which is crossed.
+#[derive(Clone, Copy)]
+struct Crossing {
+    hit: Hit,
+    surface: SurfacePoint,
+    solid: Solid,
+    entering: bool,
+}
+
+/// The scene as rays see it which know what they are inside of.
+#[derive(Clone, Copy, Debug)]
+pub struct NestedGeometry<'a> {
+    /// What rays meet.
+    pub geometry: SceneGeometry<'a>,
+    /// What it is made of.
+    pub materials: &'a MaterialTable,
+    /// Which solids may overlap.
+    pub solids: &'a Solids,
+}
+
+impl NestedGeometry<'_> {
+    /// What a ray meets at a hit, when it has come there inside `inside`.
+    #[inline]
+    pub fn meet<I: Inside>(
+        &self,
+        ray: &Ray,
+        hit: Hit,
+        inside: &I,
+        faults: &mut NestingFaults,
+    ) -> Meeting<I> {
+        let surface = self.geometry.surface(ray, &hit);
+        let plain = |beyond| Meeting::Surface { hit, surface, beyond, outside: None };
+        if !I::ABSORBS {
+            return plain(*inside);
+        }
+        if let Some(stack) = inside.stack() {
+            return match self.solids.places.get(hit.instance as usize) {
+                Some(&place) if place != NOTHING => {
+                    self.meet_solid(ray, place, hit, surface, stack, faults)
+                }
+                _ => plain(*inside),
+            };
+        }
+        let material = self.geometry.instances[hit.instance as usize].material;
+        if material == NOTHING || !self.materials.is_dielectric(material) {
+            return plain(*inside);
+        }
+        plain(inside.beyond(material, ray.d.dot(surface.ng) < 0.0))
+    }
+
+    /// The same at a solid, with all surfaces that lie there.
+    fn meet_solid<I: Inside>(
+        &self,
+        ray: &Ray,
+        place: u32,
+        hit: Hit,
+        surface: SurfacePoint,
+        stack: &SolidStack,
+        faults: &mut NestingFaults,
+    ) -> Meeting<I> {
+        let entry = &self.solids.list[place as usize];
+        let entering = ray.d.dot(surface.ng) < 0.0;
+        let mut crossings =
+            [Crossing { hit, surface, solid: entry.solid, entering }; 1 + MOST_AT_ONCE];
+        let count = self.find_others(entry, ray, &mut crossings);
+        let crossings = &crossings[..count];
+        let (mut before, mut beyond) = (*stack, *stack);
+        for crossing in crossings {
+            let Crossing { solid, entering, hit, .. } = crossing;
+            let room = if *entering {
+                beyond.enter(*solid)
+            } else if beyond.leave(solid.instance) {
+                true
+            } else {
+                // It must have been inside: from now on it was.
+                if !self.has_holes(hit) {
+                    faults.add(solid.instance, stack.first().map(|first| first.instance));
+                }
+                before.enter(*solid)
+            };
+            faults.forgotten += u64::from(!room);
+        }
+        let owner = match (before.first(), beyond.first()) {
+            (Some(a), Some(b)) if a.instance == b.instance => None,
+            (Some(a), Some(b)) if a.outranks(b) => Some((a, Some(b))),
+            (Some(a), Some(b)) => Some((b, Some(a))),
+            (Some(a), None) | (None, Some(a)) => Some((a, None)),
+            (None, None) => None,
+        };
+        let owner = owner.and_then(|(owner, outside)| {
+            let crossing = crossings.iter().find(|c| c.solid.instance == owner.instance)?;
+            Some((crossing, outside.map(|solid| solid.material)))
+        });
+        let beyond = I::new(&beyond);
+        match owner {
+            Some((&Crossing { hit, surface, .. }, outside)) => {
+                Meeting::Surface { hit, surface, beyond, outside }
+            }
+            None => Meeting::Nothing { surface: crossings[0].surface, beyond },
+        }
+    }
+
+    /// Finds the surfaces of other solids at the place of the first crossing, and widens the bounds of all
+    /// so that rays leave them together. Returns how many there are with the first.
+    fn find_others(
+        &self,
+        entry: &Entry,
+        ray: &Ray,
+        crossings: &mut [Crossing; 1 + MOST_AT_ONCE],
+    ) -> usize {
+        let (first, last) = entry.neighbours;
+        if first == last {
+            return 1;
+        }
+        let surface = &mut crossings[0].surface;
+        surface.p_error *= SAME_PLACE;
+        let SurfacePoint { p, p_error, ng, .. } = *surface;
+        let (near, far) =
+            (offset_ray_origin(p, p_error, ng, -ray.d), offset_ray_origin(p, p_error, ng, ray.d));
+        let probe = Ray { o: near, d: far - near, time: ray.time };
+        let ends = Aabb::from_points([near, far]);
+        let mut count = 1;
+        for &other in &self.solids.neighbours[first as usize..last as usize] {
+            let other = &self.solids.list[other as usize];
+            if count > MOST_AT_ONCE || !crate::extract::overlap(&other.bounds, &ends) {
+                continue;
+            }
+            let Some(hit) = self.hit(other, &probe, 1.0) else { continue };
+            let mut surface = self.geometry.surface(&probe, &hit);
+            let entering = probe.d.dot(surface.ng) < 0.0;
+            // Whoever leaves from here leaves the first surface as well.
+            surface.p_error += p_error + (surface.p - p).abs();
+            crossings[count] = Crossing { hit, surface, solid: other.solid, entering };
+            count += 1;
+        }
+        count
+    }
+
+    /// The nearest hit of one solid.
+    fn hit(&self, entry: &Entry, ray: &Ray, t_max: f64) -> Option<Hit> {
+        self.geometry.hit_of(entry.solid.instance, entry.tree.as_deref(), ray, t_max)
+    }
+
+    fn has_holes(&self, hit: &Hit) -> bool {
+        self.materials.has_opacity(self.geometry.instances[hit.instance as usize].material)
+    }
+
+    /// The solids around a point.
+    pub fn around(&self, p: Vec3, time: f32) -> SolidStack {
+        let mut stack = SolidStack::default();
+        let ray = Ray { o: p, d: Vec3::Y, time };
+        for entry in &self.solids.list {
+            let closed = entry.bounds.contains(p);
+            let below = entry.is_mesh && {
+                let Aabb { min, max } = entry.bounds;
+                (min.x..=max.x).contains(&p.x) && (min.z..=max.z).contains(&p.z) && p.y <= max.y
+            };
+            if !(closed || below) {
+                continue;
+            }
+            let leaves = |hit: &Hit| self.geometry.surface(&ray, hit).ng.y > 0.0;
+            let Some(hit) = self.hit(entry, &ray, f64::INFINITY).filter(leaves) else { continue };
+            let first = || self.geometry.closest_hit(&ray, hit.t.next_up(), false);
+            if closed || first().is_none_or(|first| first.instance == hit.instance) {
+                // Without room it is the lowest in rank that is not known of.
+                stack.enter(entry.solid);
+            }
+        }
+        stack
+    }
+
+    /// A ray went off to infinity, which it cannot do inside a solid that has an end.
+    pub fn escape<I: Inside>(&self, inside: &I, faults: &mut NestingFaults) {
+        let Some(stack) = inside.stack() else { return };
+        let ends = |solid: &&Solid| {
+            let place = self.solids.places[solid.instance as usize];
+            self.solids.list[place as usize].bounds.min.is_finite()
+        };
+        if let Some(solid) = stack.solids().iter().rev().find(ends) {
+            faults.add(solid.instance, stack.first().map(|first| first.instance));
+        }
+    }
+}
+
+/// Writes [`Solids`] when objects or materials changed.
+pub fn find_solids(
+    instances: Res<Instances>,
+    surfaces: Res<Surfaces>,
+    meshes: Res<MeshTrees>,
+    mut table: ResMut<Solids>,
+) {
+    if !(instances.is_changed() || surfaces.is_changed() || meshes.is_changed()) {
+        return;
+    }
+    let found = solids(&instances.list, &surfaces.materials);
+    let mut list: Vec<Entry> = found
+        .iter()
+        .map(|&index| {
+            let instance = &instances.list[index as usize];
+            let interior = surfaces.materials.interior(instance.material);
+            let priority = interior.map_or(0, |interior| interior.priority);
+            let solid = Solid { instance: index, material: instance.material, priority };
+            let tree = match instance.geometry {
+                Geometry::Mesh(mesh) => table.tree_of(&meshes.list[mesh as usize]),
+                Geometry::Primitive(_) => None,
+            };
+            let is_mesh = matches!(instance.geometry, Geometry::Mesh(_));
+            Entry { solid, bounds: instance.bounds, is_mesh, tree, neighbours: (0, 0) }
+        })
+        .collect();
+    let mut places = vec![NOTHING; instances.list.len()];
+    for (place, &index) in (0..).zip(&found) {
+        places[index as usize] = place;
+    }
+    let mut pairs: Vec<(u32, u32)> = overlapping_pairs(&instances.list, &found)
+        .into_iter()
+        .map(|(a, b)| (places[a as usize], places[b as usize]))
+        .flat_map(|(a, b)| [(a, b), (b, a)])
+        .collect();
+    pairs.sort_unstable();
+    for (place, entry) in (0..).zip(&mut list) {
+        let start = |place: u32| pairs.partition_point(|pair| pair.0 < place) as u32;
+        entry.neighbours = (start(place), start(place + 1));
+    }
+    let neighbours = pairs.into_iter().map(|pair| pair.1).collect();
+    *table = Solids { list, places, neighbours };
+}
+
+impl Solids {
+    /// A tree for a mesh which has none of its own; that of the frame before, if there was one.
+    fn tree_of(&self, mesh: &MeshTree) -> Option<Arc<MeshTree>> {
+        if !mesh.is_elsewhere() {
+            return None;
+        }
+        let known = self.list.iter().filter_map(|entry| entry.tree.as_ref());
+        let same = |tree: &&Arc<MeshTree>| Arc::ptr_eq(&tree.mesh, &mesh.mesh);
+        let known = known.into_iter().find(same).cloned();
+        Some(known.unwrap_or_else(|| Arc::new(MeshTree::build(mesh.mesh.clone(), mesh.quality()))))
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        let trees: usize = self
+            .list
+            .iter()
+            .filter_map(|entry| entry.tree.as_ref())
+            .map(|tree| tree.memory())
+            .sum();
+        let words = (self.places.capacity() + self.neighbours.capacity()) * size_of::<u32>();
+        trees + words + self.list.capacity() * size_of::<Entry>()
+    }
+}
