@@ -383,7 +383,7 @@ impl Simulation {
             ("mesh trees", trees as u64),
             ("tree of resting meshes", resting as u64),
             ("top level", top as u64),
-            ("light table", lights as u64),
+            ("light table", "photon source", lights as u64),
         ]
     }
 
