@@ -161,11 +161,8 @@ fn which_solid_wins_decides_where_light_bends() {
         let aim = 6.0 * s - tan(1.0) * (6.0 * 50.0_f64.to_radians().cos() - 1.0 + 8.0);
         let edge = aim - lengths[0] * tan(1.8) - lengths[1] * tan(1.3);
         let text = bench(50.0, "", &materials, objects).replace(
-            r#"(translation: (0, 0, -9)), shape: Rectangle(size: (4000, 4000))"#,
-            &format!(
-                r#"(translation: ({}, 0, -9)), shape: Rectangle(size: (2, 4000))"#,
-                edge - 1.0
-            ),
+            "(translation: (0, 0, -9)), shape: Rectangle(size: (4000, 4000))",
+            &format!("(translation: ({}, 0, -9)), shape: Rectangle(size: (2, 4000))", edge - 1.0),
         );
         let picture = render(&text, (64, 16), 64);
         let left = picture.mean_where(|x, _| x < 31).mean;

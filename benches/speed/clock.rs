@@ -1,7 +1,5 @@
 //! Time on a processor, which other programs on the machine disturb less than time on the wall.
 
-use std::time::Instant;
-
 /// Whose time is asked for.
 #[derive(Clone, Copy)]
 enum Whose {
@@ -9,27 +7,28 @@ enum Whose {
     Process,
 }
 
-/// Seconds on a processor, by POSIX's `clock_gettime`; `None` where that is not asked.
+/// Seconds on a processor, by POSIX's `clock_gettime`.
 #[cfg(target_os = "linux")]
-fn spent(whose: Whose) -> Option<f64> {
+fn spent(whose: Whose) -> f64 {
     use rustix::time::{ClockId, clock_gettime};
     let time = clock_gettime(match whose {
         Whose::Thread => ClockId::ThreadCPUTime,
         Whose::Process => ClockId::ProcessCPUTime,
     });
-    Some(time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9)
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
+/// Seconds on the wall, where the processor is not asked.
 #[cfg(not(target_os = "linux"))]
-fn spent(_: Whose) -> Option<f64> {
-    None
+fn spent(_: Whose) -> f64 {
+    static START: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+    START.get_or_init(std::time::Instant::now).elapsed().as_secs_f64()
 }
 
 fn timed<T>(whose: Whose, work: impl FnOnce() -> T) -> (f64, T) {
-    let (start, before) = (Instant::now(), spent(whose));
+    let before = spent(whose);
     let result = work();
-    let wall = start.elapsed().as_secs_f64();
-    (before.zip(spent(whose)).map_or(wall, |(a, b)| b - a), result)
+    (spent(whose) - before, result)
 }
 
 /// CPU-seconds of this thread for a piece of work; of the clock where the system does not tell.

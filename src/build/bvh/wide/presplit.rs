@@ -23,9 +23,6 @@ use rayon::prelude::*;
 /// Halvings by which the shares are fitted to the budget: more would move it by less than one in a
 /// thousand.
 const FIT_STEPS: usize = 24;
-/// A triangle is cut only if its priority is this many times the mean. The priority is a cube root: it
-/// then wastes at least 8 times as much room as most.
-const WORTH: f64 = 2.0;
 /// Levels of the grid: cells of finer ones are within rounding of the coordinates.
 const LEVELS: u32 = 24;
 
@@ -40,9 +37,8 @@ pub(super) fn references(mesh: &TriangleMesh, budget: f32) -> Vec<Reference> {
         let reference = |triangle| Reference::new(&whole(triangle), triangle);
         list.par_extend((0..count).into_par_iter().map(reference));
     } else {
-        let mut priorities: Vec<f32> =
+        let priorities: Vec<f32> =
             (0..count).into_par_iter().map(|triangle| priority(corners(mesh, triangle))).collect();
-        forget_small(&mut priorities);
         let per_priority = fit(&priorities, extra);
         let scene = mesh.positions.iter().filter(|p| p.is_finite()).copied();
         let scene = Aabb::from_points(scene);
@@ -77,16 +73,6 @@ fn priority([a, b, c]: [Vec3; 3]) -> f32 {
     let projections = (b - a).cross(c - a).abs().element_sum();
     let gain = (bounds.max - bounds.min).max_element() * (bounds.area() - projections);
     if gain > 0.0 && gain.is_finite() { gain.cbrt() } else { 0.0 }
-}
-
-/// Leaves the triangles uncut whose boxes waste no more room than most.
-///
-/// In a mesh of even triangles no cut makes a ray much faster, and all of them cost memory and an
-/// entry more in the tree: hills of a million triangles were 4 % slower with them.
-fn forget_small(priorities: &mut [f32]) {
-    let mean = priorities.iter().map(|&p| f64::from(p)).sum::<f64>() / priorities.len() as f64;
-    let least = (WORTH * mean) as f32;
-    priorities.par_iter_mut().filter(|p| **p < least).for_each(|p| *p = 0.0);
 }
 
 /// Number of cuts of a triangle.
