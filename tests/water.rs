@@ -162,3 +162,45 @@ fn under(mesh: &TriangleMesh, at: DVec2) -> Option<(f64, DVec3)> {
         inside.then(|| (height, (b - a).cross(c - a).normalize()))
     })
 }
+
+/// Oracle: the mean of 32 pictures of the surface at rest at times spread over the shutter. Slopes change
+/// the light of a distant lamp; nothing else moves.
+#[test]
+fn a_surface_which_moves_in_the_shutter_is_the_mean_of_its_moments() {
+    let picture = |shutter: (f64, f64), samples: u32| {
+        let text = format!(
+            r#"(
+            clock: (fps: 1, frames: (0, 0), shutter: ({}, {})),
+            render: (size: (12, 12), samples: {samples}, max_depth: 1, filter: Box(radius: 0.5)),
+            materials: {{ "clay": Diffuse(albedo: (0.8, 0.8, 0.8)) }},
+            meshes: {{ "water": Waves(size: (4, 4), cells: (60, 60), waves: [(amplitude: 0.12, frequency: 1)]) }},
+            entities: {{
+                "camera": (transform: (translation: (0, 3, 0.01), look_at: (0, 0, 0)), camera: (fov: 40)),
+                "sun": (transform: (rotation: (-40, 90, 0)), light: Directional(irradiance: (3, 3, 3))),
+                "water": (shape: Mesh("water"), material: "clay"),
+            }})"#,
+            shutter.0, shutter.1
+        );
+        let scene = parse_scene_str("waves.ron", &text, None, &LoadOptions::default());
+        let scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+        let mut simulation = Simulation::from_description(&scene);
+        let frame = simulation.render_frame(0, &RenderControl::default()).expect("a camera");
+        assert_eq!(frame.report.non_finite, 0);
+        let at = |k: u32| f64::from(frame.film.radiance(k % 12, k / 12).y);
+        (0..144).map(at).collect::<Vec<f64>>()
+    };
+    let difference = |a: &[f64], b: &[f64]| {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum::<f64>() / a.iter().sum::<f64>()
+    };
+    let moving = picture((0.0, 0.5), 256);
+    let mut mean = vec![0.0; 144];
+    for k in 0..32 {
+        let t = (f64::from(k) + 0.5) / 64.0;
+        for (sum, value) in mean.iter_mut().zip(picture((t, t), 16)) {
+            *sum += value / 32.0;
+        }
+    }
+    assert!(difference(&moving, &mean) < 5e-3, "{}", difference(&moving, &mean));
+    let opening = picture((0.0, 0.0), 64);
+    assert!(difference(&moving, &opening) > 0.1, "{}", difference(&moving, &opening));
+}
