@@ -69,8 +69,12 @@ impl<'a> Vertex<'a> {
         if !self.is_consistent(wi) {
             return (Rgb::ZERO, 0.0);
         }
-        let (wo, wi) = (self.frame.to_local(self.wo), self.frame.to_local(wi));
-        let value = self.bsdf.evaluate(wo, wi, TransportMode::Radiance);
+        let local = |v: Vec3| match self.bsdf {
+            // It looks at cosines alone, and is asked for the most connections.
+            Bsdf::Diffuse(_) => Vec3::Z * v.dot(self.frame.z),
+            _ => self.frame.to_local(v),
+        };
+        let value = self.bsdf.evaluate(local(self.wo), local(wi), TransportMode::Radiance);
         (value.f_cos, value.pdf)
     }
 
