@@ -315,6 +315,34 @@ fn photons_find_the_light_of_paths_through_nested_solids() {
     }
 }
 
+/// Oracle: the share `a` of the light without the ball, for a lamp in the middle of a ball of radius 1 which
+/// absorbs and does not bend light. Photons begin inside of it.
+#[test]
+fn a_lamp_inside_a_solid_shines_through_it() {
+    let a = 0.4;
+    let picture = |ball: &str| {
+        let text = format!(
+            r#"(render: (filter: Box(), integrator: Sppm),
+            materials: {{
+                "floor": Diffuse(albedo: 0.5),
+                "smoke": Dielectric(ior: 1, attenuation: (color: ({a}, {a}, {a}), distance: 1)),
+            }},
+            entities: {{
+                "camera": (transform: (translation: (3, 1, 0), look_at: (0, -2, 0)), camera: (fov: 20)),
+                "floor": (transform: (translation: (0, -2, 0), rotation: (-90, 0, 0)), shape: Rectangle(size: (20, 20)), material: "floor"),
+                "lamp": (light: Point(intensity: Some((5, 5, 5)))),
+                {ball}
+            }})"#
+        );
+        render(&text, (16, 16), 64)
+    };
+    let (open, inside) =
+        (picture(""), picture(r#""ball": (shape: Sphere(radius: 1), material: "smoke")"#));
+    let ratio = inside.mean().mean / open.mean().mean;
+    // The photons of a pass are spread over the floor evenly; their count leaves about a hundredth.
+    assert!((ratio / a - 1.0).abs() < 0.03, "{ratio} instead of {a}");
+}
+
 #[test]
 fn nested_pictures_have_the_same_bits_for_any_number_of_threads() {
     for integrator in ["Path", "Sppm"] {
