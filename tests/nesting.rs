@@ -378,6 +378,36 @@ fn solids_apart_require_nothing() {
     assert!(reason.contains("`pane`") && reason.contains("`drink`"), "{reason}");
 }
 
+/// A ray which turns out to be inside a solid knows it from then on, also when it is reflected there. The
+/// camera is off the middle of a dense ball with a hole straight above it, so that what is around it is
+/// not found; most of its rays are reflected totally many times.
+///
+/// Oracle: each path can leave the ball unentered once, and go off by the hole once.
+#[test]
+fn a_ray_inside_by_surprise_counts_once() {
+    let mut ball = icosphere(4, false);
+    let hole = Vec3::new(0.0, 0.6, 0.8);
+    let positions = ball.positions.clone();
+    let is_near = |t: &[u32; 3]| t.iter().all(|&k| positions[k as usize].dot(hole) > 0.97);
+    ball.triangles.retain(|t| !is_near(t));
+    let text = format!(
+        r#"(render: (filter: Box(), max_depth: 60, roulette_depth: 60, integrator: Path), meshes: {{ {} }},
+        materials: {{"dense": Dielectric(ior: 2.4), "water": Dielectric(ior: 1.333, priority: -1)}},
+        entities: {{
+            "camera": (transform: (translation: (0, 0, 0.8)), camera: (fov: 60)),
+            "sky": (light: Sky(radiance: 1)),
+            "ball": (shape: Mesh("ball"), material: "dense"),
+            "drop": (transform: (translation: (3, 0, 0)), shape: Sphere(radius: 2.1), material: "water"),
+        }})"#,
+        mesh_text("ball", &ball)
+    );
+    let picture = render(&text, (16, 16), 16);
+    let warning = picture.report.warnings.first().expect("the ball has a hole");
+    let count: u64 = warning.split(' ').next().and_then(|n| n.parse().ok()).expect("a count");
+    let paths = picture.report.samples;
+    assert!((paths..=2 * paths).contains(&count), "{count} of {paths}: {warning}");
+}
+
 /// A ball whose normals point inwards, in water: rays leave it before they enter it. The warning says
 /// where; sound scenes have none (see the tests above).
 #[test]

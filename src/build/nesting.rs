@@ -93,13 +93,14 @@ pub struct NestedGeometry<'a> {
 }
 
 impl NestedGeometry<'_> {
-    /// What a ray meets at a hit, when it has come there inside `inside`.
+    /// What a ray meets at a hit, when it has come there inside `inside`. If it turns out that it must have
+    /// been inside something else, that is put right, so that a ray which is reflected knows it as well.
     #[inline]
     pub fn meet<I: Inside>(
         &self,
         ray: &Ray,
         hit: Hit,
-        inside: &I,
+        inside: &mut I,
         faults: &mut NestingFaults,
     ) -> Meeting<I> {
         let surface = self.geometry.surface(ray, &hit);
@@ -107,10 +108,13 @@ impl NestedGeometry<'_> {
         if !I::ABSORBS {
             return plain(*inside);
         }
-        if let Some(stack) = inside.stack() {
+        if let Some(&stack) = inside.stack() {
             return match self.solids.places.get(hit.instance as usize) {
                 Some(&place) if place != NOTHING => {
-                    self.meet_solid(ray, place, hit, surface, stack, faults)
+                    let (before, meeting) =
+                        self.meet_solid(ray, place, hit, surface, stack, faults);
+                    *inside = I::new(&before);
+                    meeting
                 }
                 _ => plain(*inside),
             };
@@ -122,23 +126,23 @@ impl NestedGeometry<'_> {
         plain(inside.beyond(material, ray.d.dot(surface.ng) < 0.0))
     }
 
-    /// The same at a solid, with all surfaces that lie there.
+    /// The same at a solid, with all surfaces that lie there, and what the ray has been inside of.
     fn meet_solid<I: Inside>(
         &self,
         ray: &Ray,
         place: u32,
         hit: Hit,
         surface: SurfacePoint,
-        stack: &SolidStack,
+        stack: SolidStack,
         faults: &mut NestingFaults,
-    ) -> Meeting<I> {
+    ) -> (SolidStack, Meeting<I>) {
         let entry = &self.solids.list[place as usize];
         let entering = ray.d.dot(surface.ng) < 0.0;
         let mut crossings =
             [Crossing { hit, surface, solid: entry.solid, entering }; 1 + MOST_AT_ONCE];
         let count = self.find_others(entry, ray, &mut crossings);
         let crossings = &crossings[..count];
-        let (mut before, mut beyond) = (*stack, *stack);
+        let (mut before, mut beyond) = (stack, stack);
         for crossing in crossings {
             let Crossing { solid, entering, hit, .. } = crossing;
             let room = if *entering {
@@ -166,12 +170,13 @@ impl NestedGeometry<'_> {
             Some((crossing, outside.map(|solid| solid.material)))
         });
         let beyond = I::new(&beyond);
-        match owner {
+        let meeting = match owner {
             Some((&Crossing { hit, surface, .. }, outside)) => {
                 Meeting::Surface { hit, surface, beyond, outside }
             }
             None => Meeting::Nothing { surface: crossings[0].surface, beyond },
-        }
+        };
+        (before, meeting)
     }
 
     /// Finds the surfaces of other solids at the place of the first crossing, and widens the bounds of all

@@ -224,7 +224,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         }
         let counters = &mut context.counters.nesting;
         let (hit, surface, beyond, outside) =
-            match scene.nested().meet(&walk.ray, *hit, &walk.inside, counters) {
+            match scene.nested().meet(&walk.ray, *hit, &mut walk.inside, counters) {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
                 }

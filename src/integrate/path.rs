@@ -242,10 +242,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 self.escape(path, counters);
                 break;
             };
-            if I::ABSORBS {
-                path.throughput *= self.transmittance(&path.inside, hit.t);
-            }
-            let met = self.scene.nested().meet(&path.ray, hit, &path.inside, &mut counters.nesting);
+            let met = self.meet(path, hit, counters);
             let (hit, surface, beyond, outside) = match met {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
@@ -334,6 +331,16 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 Arrival::Drawn { from: receiver, pdf: sample.pdf }
             };
         }
+    }
+
+    /// Follows a path to a hit, through what is around it, and tells what it meets there.
+    #[inline]
+    fn meet(&self, path: &mut Path<'a, I>, hit: Hit, counters: &mut PathCounters) -> Meeting<I> {
+        if I::ABSORBS {
+            path.throughput *= self.transmittance(&path.inside, hit.t);
+        }
+        let Path { ray, inside, .. } = path;
+        self.scene.nested().meet(ray, hit, inside, &mut counters.nesting)
     }
 
     /// Ends a path which meets nothing.
@@ -470,7 +477,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
         let mut ray = *shadow_ray;
         while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
-            let surface = match self.scene.nested().meet(&ray, hit, &inside, &mut faults) {
+            let surface = match self.scene.nested().meet(&ray, hit, &mut inside, &mut faults) {
                 Meeting::Nothing { surface, beyond } => {
                     inside = beyond;
                     surface

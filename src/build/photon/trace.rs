@@ -236,7 +236,7 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             if I::ABSORBS {
                 power *= materials.transmittance(inside.medium(), hit.t);
             }
-            let meeting = self.scene.meet(&ray, hit, &inside, &mut counters.nesting);
+            let meeting = self.scene.meet(&ray, hit, &mut inside, &mut counters.nesting);
             let (hit, surface, beyond, outside) = match meeting {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
