@@ -42,8 +42,8 @@ fn every_scene_can_be_put_together_and_nothing_in_it_is_out_of_reach() {
     }
 }
 
-/// A small picture of a frame from the middle of each film: light arrives at most pixels (two samples
-/// do not find it everywhere below the water), and no sample is lost.
+/// A small picture of a frame from the middle of each film: light arrives, no sample is lost, and
+/// no path ends but by itself.
 #[test]
 fn every_scene_renders() {
     for path in scenes() {
@@ -55,11 +55,11 @@ fn every_scene_renders() {
         let rendered = simulation.render_frame(frame, &RenderControl::default());
         let rendered = rendered.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let name = path.display();
-        assert_eq!(rendered.report.non_finite, 0, "{name}");
+        assert_eq!((rendered.report.non_finite, rendered.report.truncated_paths), (0, 0), "{name}");
         let count = width * height;
         let pixels = (0..count).map(|i| rendered.film.radiance(i % width, i / width));
         let lit = pixels.filter(|radiance| radiance.max_element() > 0.0).count();
-        assert!(lit as u32 > count * 3 / 4, "{name}: {lit} of {count} pixels are not black");
+        assert!(lit as u32 > count * 9 / 10, "{name}: {lit} of {count} pixels are not black");
     }
 }
 

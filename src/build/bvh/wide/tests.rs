@@ -359,6 +359,9 @@ fn better_trees_find_the_same_for_less() {
     for tree in &trees {
         compare("room", &mesh, tree, RAYS / 4, |ray, end| nearest_of_all(&mesh, ray, end));
     }
-    let [fast, balanced, best] = [&trees[0], &trees[1], &trees[2]].map(cost);
-    assert!(best < 0.99 * balanced && balanced < fast, "{best}, {balanced}, {fast}");
+    // What it is paid for shows in meshes of thousands of triangles.
+    let larger = mesh_of(RawMesh::room(300, 10, 4));
+    let [fast, balanced, best] =
+        BvhQuality::ALL.map(|quality| cost(&WideTree::build(&larger, quality)));
+    assert!(best < 0.97 * balanced && balanced < fast, "{best}, {balanced}, {fast}");
 }
