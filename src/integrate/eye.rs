@@ -242,16 +242,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let wo = -walk.ray.d;
         let mut roulette = None;
         if OPACITY && material != NOTHING {
-            let opacity = scene.surfaces.materials.opacity(material, surface.uv);
-            if opacity < 1.0 {
-                let u = sampler.one(dimensions + dimension::ROULETTE);
-                if u >= opacity {
-                    walk.ray.o =
-                        offset_ray_origin(surface.p, surface.p_error, surface.ng, walk.ray.d);
-                    return true;
-                }
-                roulette = Some(u / opacity);
-            }
+            let u = || sampler.one(dimensions + dimension::ROULETTE);
+            let Some(left) = scene.surfaces.materials.stopped(material, surface.uv, u) else {
+                walk.ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, walk.ray.d);
+                return true;
+            };
+            roulette = left;
         }
         if !self.left_to_photons(walk) {
             let time = walk.ray.time;

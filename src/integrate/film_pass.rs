@@ -31,6 +31,21 @@ pub struct IntegrateStatus {
     pub warnings: Vec<String>,
 }
 
+impl IntegrateStatus {
+    /// Forgets the frame before and makes an empty film; `None` when the frame is not to be rendered.
+    pub(super) fn begin(
+        &mut self,
+        settings: &RenderSettings,
+        control: &RenderControl,
+    ) -> Option<Film> {
+        *self = Self::default();
+        if control.cancel.load(Relaxed) {
+            return None;
+        }
+        Film::new(settings.size, &settings.layers).map_err(|error| self.error = Some(error)).ok()
+    }
+}
+
 /// Everything but the scene that decides the samples of a tile.
 pub(super) struct Job<'a> {
     pub(super) settings: &'a RenderSettings,
@@ -76,17 +91,7 @@ pub fn render_film(
     mut status: ResMut<IntegrateStatus>,
 ) {
     let settings = &settings.0;
-    *status = IntegrateStatus::default();
-    if control.cancel.load(Relaxed) {
-        return;
-    }
-    let mut film = match Film::new(settings.size, &settings.layers) {
-        Ok(film) => film,
-        Err(error) => {
-            status.error = Some(error);
-            return;
-        }
-    };
+    let Some(mut film) = status.begin(settings, &control) else { return };
     let scene = tables.view();
     let requires = |feature| scene.requirements.has(feature);
     let job = Job::new(settings, &scene, clock.frame, &control);

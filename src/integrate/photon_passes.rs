@@ -125,17 +125,7 @@ pub fn render_film_with_photons(
     mut status: ResMut<IntegrateStatus>,
 ) {
     let settings = &settings.0;
-    *status = IntegrateStatus::default();
-    if control.cancel.load(Relaxed) {
-        return;
-    }
-    let mut film = match Film::new(settings.size, &settings.layers) {
-        Ok(film) => film,
-        Err(error) => {
-            status.error = Some(error);
-            return;
-        }
-    };
+    let Some(mut film) = status.begin(settings, &control) else { return };
     let scene = tables.view();
     let job = Job::new(settings, &scene, clock.frame, &control);
     let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };

@@ -19,5 +19,5 @@ pub use mesh_tree::{MeshTree, MeshTrees, rebuild_mesh_trees};
 pub use resting::{RestingTree, join_resting_meshes};
 pub use surface::SurfacePoint;
 pub use top::{TopLevel, rebuild_top_level};
-pub use tree::Bvh;
+pub(crate) use tree::Bvh;
 pub use wide::{MovingTree, TriangleHit, WideTree};

@@ -5,16 +5,14 @@
 //! (equal centres) or the tree gets deep, boxes are divided in halves by count, so that the depth is
 //! bounded for any input.
 
-use crate::math::{Aabb, gamma_f64};
-use crate::shape::LocalRay;
-use glam::DVec3;
+use crate::math::Aabb;
 
 /// Number of bins along the axis of a split.
 const BINS: usize = 16;
 /// Nodes at this depth are halved by count, which ends 32 levels further down at the latest.
 const DEEPEST_SAH: usize = 40;
-/// Room on the traversal stack: one entry per level.
-const STACK: usize = DEEPEST_SAH + 32;
+/// Most levels of a tree.
+pub(super) const DEEPEST: usize = DEEPEST_SAH + 32;
 /// Cost of visiting a node relative to testing a primitive, of the surface area heuristic.
 const NODE_COST: f32 = 1.0;
 
@@ -78,28 +76,6 @@ impl Bvh {
         self.subdivide(first + 1, right, depth + 1, max_leaf);
     }
 
-    /// Recomputes all boxes for moved primitives; the tree keeps its shape. `boxes` has the order of
-    /// the build.
-    pub fn refit(&mut self, boxes: &[Aabb]) {
-        // Children come after their parent.
-        for k in (0..self.nodes.len()).rev() {
-            let Node { first, count, .. } = self.nodes[k];
-            let first = first as usize;
-            self.nodes[k].bounds = if count == 0 {
-                self.nodes[first].bounds.union(self.nodes[first + 1].bounds)
-            } else {
-                self.order[first..first + count as usize]
-                    .iter()
-                    .fold(Aabb::EMPTY, |b, &index| b.union(boxes[index as usize]))
-            };
-        }
-    }
-
-    /// The box around everything; empty for an empty tree.
-    pub fn bounds(&self) -> Aabb {
-        self.nodes.first().map_or(Aabb::EMPTY, |root| root.bounds)
-    }
-
     /// The index of the root; `None` for an empty tree.
     pub(super) fn root(&self) -> Option<usize> {
         (!self.nodes.is_empty()).then_some(0)
@@ -125,94 +101,6 @@ impl Bvh {
     /// Surface area of the box of a node.
     pub(super) fn area(&self, node: usize) -> f32 {
         self.nodes[node].bounds.area()
-    }
-
-    /// Bytes held.
-    pub fn memory(&self) -> usize {
-        self.nodes.capacity() * size_of::<Node>() + self.order.capacity() * size_of::<u32>()
-    }
-
-    /// Visits the primitives whose boxes the ray may meet before `t_max`, nearer boxes first.
-    ///
-    /// `visit` gets a primitive and the current `t_max` and returns the new one; a `t_max` of 0 or
-    /// less ends the traversal.
-    #[inline]
-    pub fn traverse(&self, ray: &LocalRay, mut t_max: f64, mut visit: impl FnMut(u32, f64) -> f64) {
-        let Some(root) = self.nodes.first() else { return };
-        let slabs = Slabs::new(ray);
-        if slabs.enter(&root.bounds, t_max).is_none() {
-            return;
-        }
-        if root.count > 0 {
-            // A tree of one leaf needs no stack.
-            for &index in &self.order {
-                t_max = visit(index, t_max);
-                if t_max <= 0.0 {
-                    return;
-                }
-            }
-            return;
-        }
-        let mut stack = [(0_u32, 0.0_f32); STACK];
-        let mut depth = 0;
-        let mut current = 0_usize;
-        loop {
-            let node = &self.nodes[current];
-            if node.count == 0 {
-                let (a, b) = (node.first as usize, node.first as usize + 1);
-                let enter_a = slabs.enter(&self.nodes[a].bounds, t_max);
-                let enter_b = slabs.enter(&self.nodes[b].bounds, t_max);
-                match (enter_a, enter_b) {
-                    (Some(ta), Some(tb)) => {
-                        let (near, far, t_far) = if ta <= tb { (a, b, tb) } else { (b, a, ta) };
-                        // Rounded to f32 the entry may grow: one step down keeps it a lower bound.
-                        stack[depth] = (far as u32, (t_far as f32).next_down());
-                        depth += 1;
-                        current = near;
-                        continue;
-                    }
-                    (Some(_), None) => {
-                        current = a;
-                        continue;
-                    }
-                    (None, Some(_)) => {
-                        current = b;
-                        continue;
-                    }
-                    (None, None) => {}
-                }
-            } else {
-                let first = node.first as usize;
-                for &index in &self.order[first..first + node.count as usize] {
-                    t_max = visit(index, t_max);
-                    if t_max <= 0.0 {
-                        return;
-                    }
-                }
-            }
-            loop {
-                if depth == 0 {
-                    return;
-                }
-                depth -= 1;
-                let (node, enter) = stack[depth];
-                if f64::from(enter) <= t_max {
-                    current = node as usize;
-                    break;
-                }
-            }
-        }
-    }
-
-    /// Longest path from the root, in nodes.
-    #[cfg(test)]
-    fn depth(&self) -> usize {
-        fn below(tree: &Bvh, node: usize) -> usize {
-            let Node { first, count, .. } = tree.nodes[node];
-            let first = first as usize;
-            if count > 0 { 1 } else { 1 + below(tree, first).max(below(tree, first + 1)) }
-        }
-        if self.nodes.is_empty() { 0 } else { below(self, 0) }
     }
 }
 
@@ -301,63 +189,164 @@ fn partition(items: &mut [Item], left: impl Fn(&Item) -> bool) -> usize {
     middle
 }
 
-/// A ray prepared for the test against boxes.
-struct Slabs {
-    o: DVec3,
-    inverse: DVec3,
-}
+/// The way of a ray through the binary tree, in `f64`: the tests compare others with it.
+#[cfg(test)]
+mod traversal {
+    use super::{Bvh, DEEPEST, Node};
+    use crate::math::{Aabb, gamma_f64};
+    use crate::shape::LocalRay;
+    use glam::DVec3;
 
-impl Slabs {
-    fn new(ray: &LocalRay) -> Self {
-        // A component of 0 would give 0·∞ = NaN for an origin on a face; the smallest normal number
-        // of the same sign sends both faces far enough away instead.
-        let safe =
-            |d: f64| if d.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE.copysign(d) } else { d };
-        Self { o: ray.o, inverse: ray.d.map(safe).recip() }
+    impl Bvh {
+        /// Visits the primitives whose boxes the ray may meet before `t_max`, nearer boxes first.
+        ///
+        /// `visit` gets a primitive and the current `t_max` and returns the new one; a `t_max` of 0 or
+        /// less ends the traversal.
+        #[inline]
+        pub fn traverse(
+            &self,
+            ray: &LocalRay,
+            mut t_max: f64,
+            mut visit: impl FnMut(u32, f64) -> f64,
+        ) {
+            let Some(root) = self.nodes.first() else { return };
+            let slabs = Slabs::new(ray);
+            if slabs.enter(&root.bounds, t_max).is_none() {
+                return;
+            }
+            if root.count > 0 {
+                // A tree of one leaf needs no stack.
+                for &index in &self.order {
+                    t_max = visit(index, t_max);
+                    if t_max <= 0.0 {
+                        return;
+                    }
+                }
+                return;
+            }
+            let mut stack = [(0_u32, 0.0_f32); DEEPEST];
+            let mut depth = 0;
+            let mut current = 0_usize;
+            loop {
+                let node = &self.nodes[current];
+                if node.count == 0 {
+                    let (a, b) = (node.first as usize, node.first as usize + 1);
+                    let enter_a = slabs.enter(&self.nodes[a].bounds, t_max);
+                    let enter_b = slabs.enter(&self.nodes[b].bounds, t_max);
+                    match (enter_a, enter_b) {
+                        (Some(ta), Some(tb)) => {
+                            let (near, far, t_far) = if ta <= tb { (a, b, tb) } else { (b, a, ta) };
+                            // Rounded to f32 the entry may grow: one step down keeps it a lower bound.
+                            stack[depth] = (far as u32, (t_far as f32).next_down());
+                            depth += 1;
+                            current = near;
+                            continue;
+                        }
+                        (Some(_), None) => {
+                            current = a;
+                            continue;
+                        }
+                        (None, Some(_)) => {
+                            current = b;
+                            continue;
+                        }
+                        (None, None) => {}
+                    }
+                } else {
+                    let first = node.first as usize;
+                    for &index in &self.order[first..first + node.count as usize] {
+                        t_max = visit(index, t_max);
+                        if t_max <= 0.0 {
+                            return;
+                        }
+                    }
+                }
+                loop {
+                    if depth == 0 {
+                        return;
+                    }
+                    depth -= 1;
+                    let (node, enter) = stack[depth];
+                    if f64::from(enter) <= t_max {
+                        current = node as usize;
+                        break;
+                    }
+                }
+            }
+        }
+
+        /// Longest path from the root, in nodes.
+        pub(super) fn depth(&self) -> usize {
+            fn below(tree: &Bvh, node: usize) -> usize {
+                let Node { first, count, .. } = tree.nodes[node];
+                let first = first as usize;
+                if count > 0 { 1 } else { 1 + below(tree, first).max(below(tree, first + 1)) }
+            }
+            if self.nodes.is_empty() { 0 } else { below(self, 0) }
+        }
     }
 
-    /// Where the ray enters the box, at least 0; `None` if it misses it or enters after `t_max`.
-    ///
-    /// The exit is enlarged by a factor 1 + 2γ₃, so that rounding never loses a box (Ize 2013,
-    /// "Robust BVH Ray Traversal", JCGT 2(2)).
+    /// A ray prepared for the test against boxes.
+    pub(super) struct Slabs {
+        o: DVec3,
+        inverse: DVec3,
+    }
+
+    impl Slabs {
+        pub(super) fn new(ray: &LocalRay) -> Self {
+            // A component of 0 would give 0·∞ = NaN for an origin on a face; the smallest normal number
+            // of the same sign sends both faces far enough away instead.
+            let safe = |d: f64| {
+                if d.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE.copysign(d) } else { d }
+            };
+            Self { o: ray.o, inverse: ray.d.map(safe).recip() }
+        }
+
+        /// Where the ray enters the box, at least 0; `None` if it misses it or enters after `t_max`.
+        ///
+        /// The exit is enlarged by a factor 1 + 2γ₃, so that rounding never loses a box (Ize 2013,
+        /// "Robust BVH Ray Traversal", JCGT 2(2)).
+        #[inline]
+        pub(super) fn enter(&self, bounds: &Aabb, t_max: f64) -> Option<f64> {
+            const WIDEN: f64 = 1.0 + 2.0 * gamma_f64(3);
+            let a = (bounds.min.as_dvec3() - self.o) * self.inverse;
+            let b = (bounds.max.as_dvec3() - self.o) * self.inverse;
+            let (near, far) = (lesser(a, b), greater(a, b));
+            let enter = pick_greater(pick_greater(near.x, near.y), pick_greater(near.z, 0.0));
+            let leave = pick_lesser(pick_lesser(far.x, far.y), far.z) * WIDEN;
+            let leave = pick_lesser(leave, t_max);
+            (enter <= leave).then_some(enter)
+        }
+    }
+
+    fn lesser(a: DVec3, b: DVec3) -> DVec3 {
+        DVec3::new(pick_lesser(a.x, b.x), pick_lesser(a.y, b.y), pick_lesser(a.z, b.z))
+    }
+
+    fn greater(a: DVec3, b: DVec3) -> DVec3 {
+        DVec3::new(pick_greater(a.x, b.x), pick_greater(a.y, b.y), pick_greater(a.z, b.z))
+    }
+
+    /// Minimum of two numbers neither of which is NaN, in one instruction.
     #[inline]
-    fn enter(&self, bounds: &Aabb, t_max: f64) -> Option<f64> {
-        const WIDEN: f64 = 1.0 + 2.0 * gamma_f64(3);
-        let a = (bounds.min.as_dvec3() - self.o) * self.inverse;
-        let b = (bounds.max.as_dvec3() - self.o) * self.inverse;
-        let (near, far) = (lesser(a, b), greater(a, b));
-        let enter = pick_greater(pick_greater(near.x, near.y), pick_greater(near.z, 0.0));
-        let leave = pick_lesser(pick_lesser(far.x, far.y), far.z) * WIDEN;
-        let leave = pick_lesser(leave, t_max);
-        (enter <= leave).then_some(enter)
+    fn pick_lesser(a: f64, b: f64) -> f64 {
+        if a < b { a } else { b }
     }
-}
 
-fn lesser(a: DVec3, b: DVec3) -> DVec3 {
-    DVec3::new(pick_lesser(a.x, b.x), pick_lesser(a.y, b.y), pick_lesser(a.z, b.z))
-}
-
-fn greater(a: DVec3, b: DVec3) -> DVec3 {
-    DVec3::new(pick_greater(a.x, b.x), pick_greater(a.y, b.y), pick_greater(a.z, b.z))
-}
-
-/// Minimum of two numbers neither of which is NaN, in one instruction.
-#[inline]
-fn pick_lesser(a: f64, b: f64) -> f64 {
-    if a < b { a } else { b }
-}
-
-/// Maximum of two numbers neither of which is NaN, in one instruction.
-#[inline]
-fn pick_greater(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+    /// Maximum of two numbers neither of which is NaN, in one instruction.
+    #[inline]
+    fn pick_greater(a: f64, b: f64) -> f64 {
+        if a > b { a } else { b }
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::traversal::Slabs;
     use super::*;
     use crate::sampling::Sampler;
-    use glam::Vec3;
+    use crate::shape::LocalRay;
+    use glam::{DVec3, Vec3};
 
     fn random_boxes(count: u32, size: f32) -> Vec<Aabb> {
         (0..count)
@@ -442,7 +431,7 @@ mod tests {
             [vec![], vec![point], vec![point; 100_000], line, vec![huge, point, Aabb::EMPTY]]
         {
             let tree = Bvh::build(&boxes, 4);
-            assert!(tree.depth() <= STACK, "depth {}", tree.depth());
+            assert!(tree.depth() <= DEEPEST, "depth {}", tree.depth());
             let mut order = tree.order.clone();
             order.sort_unstable();
             let full: Vec<u32> =
@@ -451,7 +440,7 @@ mod tests {
         }
     }
 
-    /// Every box lies in the boxes of all its ancestors, after the build and after a refit.
+    /// Every box lies in the boxes of all its ancestors.
     #[test]
     fn nodes_enclose_what_is_below_them() {
         fn check(tree: &Bvh, node: usize, boxes: &[Aabb]) {
@@ -469,10 +458,6 @@ mod tests {
             }
         }
         let boxes = random_boxes(3000, 0.05);
-        let mut tree = Bvh::build(&boxes, 4);
-        check(&tree, 0, &boxes);
-        let moved: Vec<Aabb> = random_boxes(3000, 0.3).into_iter().rev().collect();
-        tree.refit(&moved);
-        check(&tree, 0, &moved);
+        check(&Bvh::build(&boxes, 4), 0, &boxes);
     }
 }

@@ -9,8 +9,9 @@ use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
 /// A rectangle farther away than this many of its diagonals is drawn from by area, a nearer one by
-/// solid angle. At this distance `cos θ/d²` varies by a third over the light, the noise of which
-/// does not show beside that of shadows; the draw costs a fifth.
+/// solid angle. Measured on the Cornell box, 12 samples: by solid angle everywhere 2.6 CPU-seconds and a
+/// relMSE of 1.039e-3, with this distance 2.3 and 1.054e-3, by area everywhere 2.3 and 1.077e-3. Near the
+/// lamp area alone would be far worse: `cos θ/d²` is not bounded there.
 const FAR: f64 = 2.0;
 
 /// An emitting analytic shape.

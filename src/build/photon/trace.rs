@@ -264,15 +264,12 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             }
             let mut roulette = None;
             if OPACITY {
-                let opacity = materials.opacity(material, surface.uv);
-                if opacity < 1.0 {
-                    let u = sampler.one(dimensions + dimension::ROULETTE);
-                    if u >= opacity {
-                        ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
-                        continue;
-                    }
-                    roulette = Some(u / opacity);
-                }
+                let u = || sampler.one(dimensions + dimension::ROULETTE);
+                let Some(left) = materials.stopped(material, surface.uv, u) else {
+                    ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                    continue;
+                };
+                roulette = left;
             }
             // What is left at a surface has met at most `max_depth` surfaces with that one.
             if depth + 1 >= self.max_depth {
