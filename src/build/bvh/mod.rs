@@ -4,7 +4,7 @@
 //! * One more over all meshes which stand still and are used once ([`RestingTree`]).
 //! * A tree over the objects of a frame ([`TopLevel`]), whose leaves lead to these and to analytic shapes.
 //!
-//! [`Bvh`] is the binary tree that the top level is made from.
+//! `tree` holds the binary tree that the top level is made from.
 
 mod geometry;
 mod mesh_tree;
