@@ -43,6 +43,11 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
+    /// How far its farthest coordinate is from 0; infinite for an empty box.
+    pub fn reach(&self) -> f32 {
+        self.min.abs().max(self.max.abs()).max_element()
+    }
+
     /// Surface area of the box, 0 for an empty one.
     pub fn area(&self) -> f32 {
         if self.is_empty() {

@@ -1,12 +1,13 @@
 //! The tests of boxes and triangles with the AVX2 instructions of x86-64.
 //!
-//! Chosen at run time where the processor has them. The operations and their order are those of the
-//! plain ones, without fused multiplication, so that the bits of a hit are the same.
+//! Chosen at run time where the processor has them. Triangles are tested by the same operations in the
+//! same order as in plain Rust, without fused multiplication, so that the bits of a hit are the same.
+//! Boxes decide no hit, so that there it may be used ([`FusedRay`]).
 #![expect(unsafe_code, reason = "vector instructions, used only where the processor has them")]
 
 use super::boxes::{BoxTree, visit_boxes};
 use super::node::{BLOCK, Block, Node};
-use super::ray::BoxRay;
+use super::ray::{BoxRay, FusedRay};
 use super::traverse::{
     BlockHits, Distances, Lanes, Nodes, TriangleHit, WideCorners, any_hit, closest_hit,
 };
@@ -14,10 +15,10 @@ use crate::shape::{LocalRay, TriangleTest};
 use std::arch::x86_64::{
     __m256, __m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ, _MM_HINT_T0, _mm_loadu_ps,
     _mm_prefetch, _mm256_add_pd, _mm256_and_pd, _mm256_andnot_pd, _mm256_cmp_pd, _mm256_cmp_ps,
-    _mm256_cvtps_pd, _mm256_div_pd, _mm256_load_ps, _mm256_loadu_pd, _mm256_max_pd, _mm256_max_ps,
-    _mm256_min_pd, _mm256_min_ps, _mm256_movemask_pd, _mm256_movemask_ps, _mm256_mul_pd,
-    _mm256_mul_ps, _mm256_set1_pd, _mm256_set1_ps, _mm256_setzero_pd, _mm256_setzero_ps,
-    _mm256_store_pd, _mm256_store_ps, _mm256_sub_pd, _mm256_sub_ps,
+    _mm256_cvtps_pd, _mm256_div_pd, _mm256_fmadd_ps, _mm256_load_ps, _mm256_loadu_pd,
+    _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_min_ps, _mm256_movemask_pd,
+    _mm256_movemask_ps, _mm256_mul_pd, _mm256_set1_pd, _mm256_set1_ps, _mm256_setzero_pd,
+    _mm256_setzero_ps, _mm256_store_pd, _mm256_store_ps, _mm256_sub_pd,
 };
 
 /// The proof that this processor has the instructions.
@@ -30,6 +31,7 @@ impl Avx2 {
     #[inline]
     pub(super) fn detect() -> Option<Self> {
         let present = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("fma")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("popcnt");
         present.then_some(Self(()))
@@ -70,7 +72,7 @@ impl Avx2 {
     }
 }
 
-#[target_feature(enable = "avx2,bmi1,popcnt")]
+#[target_feature(enable = "avx2,fma,bmi1,popcnt")]
 fn closest_hit_avx2<N: Nodes, const STACK: usize>(
     tree: &N,
     ray: &LocalRay,
@@ -79,12 +81,12 @@ fn closest_hit_avx2<N: Nodes, const STACK: usize>(
     closest_hit::<Vectors, N, STACK>(tree, ray, t_max)
 }
 
-#[target_feature(enable = "avx2,bmi1,popcnt")]
+#[target_feature(enable = "avx2,fma,bmi1,popcnt")]
 fn any_hit_avx2<N: Nodes, const STACK: usize>(tree: &N, ray: &LocalRay, t_max: f64) -> bool {
     any_hit::<Vectors, N, STACK>(tree, ray, t_max)
 }
 
-#[target_feature(enable = "avx2,bmi1,popcnt")]
+#[target_feature(enable = "avx2,fma,bmi1,popcnt")]
 fn visit_boxes_avx2<const STACK: usize>(
     tree: &BoxTree,
     prepared: &BoxRay,
@@ -101,10 +103,9 @@ struct Vectors;
 /// A ray in every lane, for boxes.
 #[derive(Clone, Copy)]
 struct BoxLanes {
-    near_origin: [__m256; 3],
-    far_origin: [__m256; 3],
-    near_inverse: [__m256; 3],
-    far_inverse: [__m256; 3],
+    slope: [__m256; 3],
+    near_base: [__m256; 3],
+    far_base: [__m256; 3],
     near_planes: [usize; 3],
 }
 
@@ -233,12 +234,12 @@ impl Lanes for Vectors {
     type Triangles = TriangleLanes;
 
     #[inline(always)]
-    fn prepare_boxes(ray: &BoxRay) -> BoxLanes {
+    fn prepare_boxes(ray: &BoxRay, reach: f32) -> BoxLanes {
+        let FusedRay { slope, near_base, far_base } = ray.fused(reach);
         BoxLanes {
-            near_origin: lanes_of(ray.near_origin),
-            far_origin: lanes_of(ray.far_origin),
-            near_inverse: lanes_of(ray.near_inverse),
-            far_inverse: lanes_of(ray.far_inverse),
+            slope: lanes_of(slope),
+            near_base: lanes_of(near_base),
+            far_base: lanes_of(far_base),
             near_planes: ray.near_planes,
         }
     }
@@ -265,15 +266,9 @@ impl Lanes for Vectors {
                 let enter = _mm256_load_ps(node.planes.get_unchecked(plane).as_ptr());
                 let leave = _mm256_load_ps(node.planes.get_unchecked(plane ^ 1).as_ptr());
                 // Minimum and maximum return their second operand where one is NaN.
-                let a = _mm256_mul_ps(
-                    _mm256_sub_ps(ray.near_origin[axis], enter),
-                    ray.near_inverse[axis],
-                );
+                let a = _mm256_fmadd_ps(enter, ray.slope[axis], ray.near_base[axis]);
                 near = _mm256_max_ps(a, near);
-                let b = _mm256_mul_ps(
-                    _mm256_sub_ps(ray.far_origin[axis], leave),
-                    ray.far_inverse[axis],
-                );
+                let b = _mm256_fmadd_ps(leave, ray.slope[axis], ray.far_base[axis]);
                 far = _mm256_min_ps(b, far);
             }
             _mm256_store_ps(distances.0.as_mut_ptr(), near);

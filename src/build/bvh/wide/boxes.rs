@@ -32,6 +32,8 @@ pub struct BoxTree {
     area: f64,
     /// The same when the tree was built.
     area_built: f64,
+    /// No coordinate of a box is farther from 0.
+    reach: f32,
 }
 
 /// A slot of a node.
@@ -61,6 +63,7 @@ impl BoxTree {
             tree.stack = tree.emit(binary, 0);
         }
         tree.area_built = tree.area;
+        tree.reach = tree.bounds().reach();
         tree
     }
 
@@ -85,6 +88,7 @@ impl BoxTree {
     pub fn refit(&mut self, index: usize, bounds: &Aabb) {
         let Place { mut node, mut slot } = self.places[index];
         let mut bounds = *bounds;
+        self.reach = self.reach.max(bounds.reach());
         loop {
             let this = &mut self.nodes[node as usize];
             let before = this.get_box(slot as usize);
@@ -155,7 +159,8 @@ impl BoxTree {
             return;
         }
         let Some(prepared) = BoxRay::new(ray) else { return };
-        match (Instructions::detect(), self.stack <= SHORT_STACK) {
+        let instructions = Instructions::detect().fit_for(ray, self.reach);
+        match (instructions, self.stack <= SHORT_STACK) {
             #[cfg(target_arch = "x86_64")]
             (Instructions::Avx2(avx2), true) => {
                 avx2.visit_boxes::<SHORT_STACK>(self, &prepared, t_max, visit);
@@ -179,7 +184,7 @@ pub(super) fn visit_boxes<L: Lanes, const STACK: usize>(
     mut t_max: f64,
     mut visit: impl FnMut(u32, f64) -> f64,
 ) {
-    let boxes = L::prepare_boxes(prepared);
+    let boxes = L::prepare_boxes(prepared, tree.reach);
     let mut end = prepared.distance(t_max);
     let mut stack = Stack::<u64, STACK>::new();
     let mut distances = Distances::default();

@@ -263,6 +263,7 @@ pub(super) fn collapse<C: Fn(u32) -> [Vec3; 3] + Sync>(
         blocks: filled_on_large_pages(size.blocks, Block::EMPTY),
         root: Child::node(0),
         stack: size.stack,
+        reach: 0.0,
     };
     let (nodes_out, blocks_out) = (&mut tree.nodes[..], &mut tree.blocks[..]);
     let mut all = Emitter {
@@ -278,5 +279,6 @@ pub(super) fn collapse<C: Fn(u32) -> [Vec3; 3] + Sync>(
     } else {
         all.node(nodes, &plans, &size.children);
     }
+    tree.reach = tree.bounds().reach();
     tree
 }

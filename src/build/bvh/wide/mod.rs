@@ -75,11 +75,13 @@ pub struct WideTree {
     root: Child,
     /// Room on the stack that a traversal takes at most.
     stack: usize,
+    /// No coordinate of a box is farther from 0.
+    reach: f32,
 }
 
 impl Default for WideTree {
     fn default() -> Self {
-        Self { nodes: Vec::new(), blocks: Vec::new(), root: Child::NOTHING, stack: 0 }
+        Self { nodes: Vec::new(), blocks: Vec::new(), root: Child::NOTHING, stack: 0, reach: 0.0 }
     }
 }
 
@@ -102,6 +104,12 @@ impl Instructions {
         Self::Portable
     }
 
+    /// These, or plain ones for rays and boxes of a size that they are not made for.
+    #[inline]
+    fn fit_for(self, ray: &LocalRay, reach: f32) -> Self {
+        if ray::can_be_fused(ray, reach) { self } else { Self::Portable }
+    }
+
     /// The nearest hit in a tree whose traversal takes `stack` places.
     #[inline]
     fn closest_hit<N: Nodes>(
@@ -111,7 +119,7 @@ impl Instructions {
         ray: &LocalRay,
         t_max: f64,
     ) -> Option<TriangleHit> {
-        match (self, stack <= SHORT_STACK) {
+        match (self.fit_for(ray, tree.reach()), stack <= SHORT_STACK) {
             #[cfg(target_arch = "x86_64")]
             (Self::Avx2(avx2), true) => avx2.closest_hit::<N, SHORT_STACK>(tree, ray, t_max),
             #[cfg(target_arch = "x86_64")]
@@ -124,7 +132,7 @@ impl Instructions {
     /// Whether anything is hit in a tree whose traversal takes `stack` places.
     #[inline]
     fn any_hit<N: Nodes>(self, tree: &N, stack: usize, ray: &LocalRay, t_max: f64) -> bool {
-        match (self, stack <= SHORT_STACK) {
+        match (self.fit_for(ray, tree.reach()), stack <= SHORT_STACK) {
             #[cfg(target_arch = "x86_64")]
             (Self::Avx2(avx2), true) => avx2.any_hit::<N, SHORT_STACK>(tree, ray, t_max),
             #[cfg(target_arch = "x86_64")]
@@ -181,6 +189,7 @@ impl WideTree {
                 self.nodes[index].set_box(slot, &bounds);
             }
         }
+        self.reach = self.bounds().reach();
     }
 
     fn leaf_bounds(&self, leaf: Child) -> Aabb {
@@ -244,6 +253,11 @@ impl Nodes for WideTree {
     #[inline(always)]
     fn root(&self) -> Child {
         self.root
+    }
+
+    #[inline(always)]
+    fn reach(&self) -> f32 {
+        self.reach
     }
 
     #[inline(always)]

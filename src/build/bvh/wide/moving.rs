@@ -39,6 +39,8 @@ struct Segment {
     blocks: Vec<MovingBlock>,
     root: Child,
     stack: usize,
+    /// No coordinate of a box is farther from 0 at any time.
+    reach: f32,
 }
 
 /// A node at its beginning, and how far the planes of its boxes move.
@@ -185,7 +187,7 @@ impl Segment {
         let blocks = tree.blocks.par_iter().map(block).collect();
         let node = |&begin: &Node| MovingNode { begin, motion: [[0.0; WIDTH]; 6] };
         let nodes = tree.nodes.par_iter().map(node).collect();
-        let mut this = Self { nodes, blocks, root: tree.root, stack: tree.stack };
+        let mut this = Self { nodes, blocks, root: tree.root, stack: tree.stack, reach: 0.0 };
         this.fit_boxes();
         this
     }
@@ -207,6 +209,9 @@ impl Segment {
                 }
             }
         }
+        // That of a tree without nodes is not asked for.
+        let [begin, end] = ends.first().copied().unwrap_or_default();
+        self.reach = begin.union(end).reach() * (1.0 + 4.0 * ASIDE) + f32::MIN_POSITIVE;
     }
 
     fn leaf_boxes(&self, leaf: Child) -> [Aabb; 2] {
@@ -270,6 +275,11 @@ impl Nodes for At<'_> {
     #[inline(always)]
     fn root(&self) -> Child {
         self.segment.root
+    }
+
+    #[inline(always)]
+    fn reach(&self) -> f32 {
+        self.segment.reach
     }
 
     #[inline(always)]

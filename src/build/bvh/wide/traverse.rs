@@ -53,6 +53,9 @@ pub(super) trait Nodes {
     /// Where to begin.
     fn root(&self) -> Child;
 
+    /// No coordinate of a box is farther from 0.
+    fn reach(&self) -> f32;
+
     /// A node; `scratch` is there for one that must be made.
     fn node<'a>(&'a self, index: usize, scratch: &'a mut Node) -> &'a Node;
 
@@ -84,7 +87,8 @@ pub(super) trait Lanes {
     /// The ray as the triangle test wants it.
     type Triangles: Copy;
 
-    fn prepare_boxes(ray: &BoxRay) -> Self::Boxes;
+    /// `reach` is that of the boxes: none of their coordinates is farther from 0.
+    fn prepare_boxes(ray: &BoxRay, reach: f32) -> Self::Boxes;
     fn prepare_triangles(test: &TriangleTest) -> Self::Triangles;
 
     /// Which boxes the ray meets at a distance in `[0, end]`, and where.
@@ -114,7 +118,7 @@ impl Lanes for Portable {
     type Triangles = TriangleTest;
 
     #[inline(always)]
-    fn prepare_boxes(ray: &BoxRay) -> BoxRay {
+    fn prepare_boxes(ray: &BoxRay, _: f32) -> BoxRay {
         *ray
     }
 
@@ -300,7 +304,7 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
         return best;
     }
     let prepared = BoxRay::new(ray)?;
-    let boxes = L::prepare_boxes(&prepared);
+    let boxes = L::prepare_boxes(&prepared, tree.reach());
     let mut end = prepared.distance(t_max);
     let mut stack = Stack::<Key, STACK>::new();
     let mut distances = Distances::default();
@@ -381,7 +385,7 @@ pub(super) fn any_hit<L: Lanes, N: Nodes, const STACK: usize>(
         return leaf_blocks::<L, N>(tree, tree.root(), ray, None, &triangles, t_max, &mut hits);
     }
     let Some(prepared) = BoxRay::new(ray) else { return false };
-    let boxes = L::prepare_boxes(&prepared);
+    let boxes = L::prepare_boxes(&prepared, tree.reach());
     let end = prepared.distance(t_max);
     let mut stack = Stack::<u32, STACK>::new();
     let mut distances = Distances::default();
