@@ -6,9 +6,10 @@ use common::Uniforms;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec2, Vec3};
 use kinora::description::{
-    Channel, Encoding, ImageData, ImagePixels, Material, Metal, Texture, TextureFilter, Wrap,
+    Channel, Encoding, ImageData, ImagePixels, Material, Metal, Texture, TextureFilter,
+    TextureFiltering, Wrap,
 };
-use kinora::shade::{MaterialTable, RenderTexture, TransportMode, texture};
+use kinora::shade::{MaterialTable, Pyramids, TexturePoint, Textures, TransportMode};
 use std::hint::black_box;
 use std::sync::Arc;
 
@@ -72,11 +73,11 @@ fn sample(c: &mut Criterion) {
     let mut group = c.benchmark_group("shade/sample");
     group.throughput(Throughput::Elements(COUNT as u64));
     for (name, material) in materials() {
-        let table = MaterialTable::new(&[material], Vec::new());
+        let table = MaterialTable::new(&[material], Textures::default());
         group.bench_function(name, |b| {
             b.iter(|| {
                 let drawn = inputs.iter().filter_map(|&(wo, _, mut lobe, u)| {
-                    let bsdf = table.bsdf(0, u, &mut lobe);
+                    let bsdf = table.bsdf(0, &TexturePoint::at(u), &mut lobe);
                     bsdf.sample(black_box(wo), lobe, u, TransportMode::Radiance)
                 });
                 drawn.map(|sample| sample.weight).sum::<Vec3>()
@@ -92,14 +93,14 @@ fn evaluate(c: &mut Criterion) {
     let mut group = c.benchmark_group("shade/evaluate");
     group.throughput(Throughput::Elements(COUNT as u64));
     for (name, material) in materials() {
-        let table = MaterialTable::new(&[material], Vec::new());
-        if !table.bsdf(0, Vec2::ZERO, &mut 0.5).has_non_delta() {
+        let table = MaterialTable::new(&[material], Textures::default());
+        if !table.bsdf(0, &TexturePoint::at(Vec2::ZERO), &mut 0.5).has_non_delta() {
             continue;
         }
         group.bench_function(name, |b| {
             b.iter(|| {
                 let values = inputs.iter().map(|&(wo, wi, mut lobe, u)| {
-                    let bsdf = table.bsdf(0, u, &mut lobe);
+                    let bsdf = table.bsdf(0, &TexturePoint::at(u), &mut lobe);
                     bsdf.evaluate(black_box(wo), wi, TransportMode::Radiance).f_cos
                 });
                 values.sum::<Vec3>()
@@ -109,7 +110,7 @@ fn evaluate(c: &mut Criterion) {
     group.finish();
 }
 
-fn image(pixels: ImagePixels, filter: TextureFilter) -> RenderTexture {
+fn image(pixels: ImagePixels, filter: TextureFilter) -> Texture<Arc<ImageData>, u32> {
     Texture::Image {
         file: Arc::new(ImageData { width: 1024, height: 1024, pixels }),
         encoding: Encoding::Srgb,
@@ -126,7 +127,7 @@ fn texture(c: &mut Criterion) {
     let size = 1024 * 1024;
     let codes = || ImagePixels::Rgba8(vec![[90, 120, 200, 255]; size], Encoding::Srgb);
     let floats = || ImagePixels::Rgba32F(vec![[0.1, 0.2, 0.6, 1.0]; size]);
-    let checker = Texture::Checker { size: 0.1, a: Vec3::ONE, b: Vec3::ZERO };
+    let checker = Texture::Checker { size: 0.1, a: Vec3::ONE.into(), b: Vec3::ZERO.into() };
     let cases = [
         ("checker", checker),
         ("bytes_bilinear", image(codes(), TextureFilter::Bilinear)),
@@ -134,14 +135,15 @@ fn texture(c: &mut Criterion) {
         ("floats_bilinear", image(floats(), TextureFilter::Bilinear)),
     ];
     let mut uniforms = Uniforms::new(5);
-    let places: Vec<Vec2> = (0..COUNT).map(|_| uniforms.square()).collect();
+    let places: Vec<TexturePoint> =
+        (0..COUNT).map(|_| TexturePoint::at(uniforms.square())).collect();
     let mut group = c.benchmark_group("shade/texture");
     group.throughput(Throughput::Elements(COUNT as u64));
     for (name, texture) in cases {
+        let textures =
+            Textures::new(vec![texture], TextureFiltering::Anisotropic, &Pyramids::default());
         group.bench_function(name, |b| {
-            b.iter(|| {
-                black_box(&places).iter().map(|&uv| texture::color(&texture, uv)).sum::<Vec3>()
-            });
+            b.iter(|| black_box(&places).iter().map(|at| textures.color(0, at)).sum::<Vec3>());
         });
     }
     group.finish();

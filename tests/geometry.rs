@@ -9,6 +9,7 @@ use kinora::description::{BvhQuality, TriangleMesh};
 use kinora::extract::{Geometry, Instance, NOTHING};
 use kinora::math::{Aabb, MotionTransform, Ray, offset_ray_origin};
 use kinora::sampling::Sampler;
+use kinora::shade::TextureNeeds;
 use kinora::shape::{LocalRay, Primitive};
 use std::sync::Arc;
 
@@ -49,7 +50,13 @@ impl Uniforms {
 }
 
 fn mesh_of(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Arc<MeshTree> {
-    let mesh = TriangleMesh { positions, triangles, normals: Vec::new(), uvs: Vec::new() };
+    let mesh = TriangleMesh {
+        positions,
+        triangles,
+        normals: Vec::new(),
+        uvs: Vec::new(),
+        colors: Vec::new(),
+    };
     Arc::new(MeshTree::build(Arc::new(mesh), BvhQuality::default()))
 }
 
@@ -70,6 +77,8 @@ fn instance(geometry: Geometry, local: Aabb, keys: &[DAffine3]) -> Instance {
         object_id: 1,
         hidden_from_camera: false,
         needs_uv: true,
+        needs: TextureNeeds::default(),
+        size: DVec3::ONE,
     }
 }
 

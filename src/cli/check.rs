@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::format;
 use super::survey::{Survey, scene_warnings};
 use kinora::description::{
-    EntityDescription, ImagePixels, Light, SceneDescription, Shape, Texture,
+    EntityDescription, Light, SceneDescription, SceneTexture, Shape, Texture,
 };
 use std::collections::HashSet;
 use std::io::{self, IsTerminal, Write};
@@ -126,11 +126,8 @@ fn meshes(scene: &SceneDescription) -> String {
 
 fn textures(scene: &SceneDescription) -> String {
     let mut seen = HashSet::new();
-    let memory = |texture: &Texture<Arc<kinora::description::ImageData>>| match texture {
-        Texture::Image { file, .. } if seen.insert(Arc::as_ptr(file)) => match &file.pixels {
-            ImagePixels::Rgba8(pixels, _) => size_of_val(pixels.as_slice()) as u64,
-            ImagePixels::Rgba32F(pixels) => size_of_val(pixels.as_slice()) as u64,
-        },
+    let memory = |texture: &SceneTexture| match texture {
+        Texture::Image { file, .. } if seen.insert(Arc::as_ptr(file)) => file.memory() as u64,
         _ => 0,
     };
     let bytes: u64 = scene.textures.values().map(memory).sum();
@@ -184,7 +181,9 @@ fn kinds(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use kinora::description::{Channel, Encoding, ImageData, TextureFilter, TriangleMesh, Wrap};
+    use kinora::description::{
+        Channel, Encoding, ImageData, ImagePixels, TextureFilter, TriangleMesh, Wrap,
+    };
 
     #[test]
     fn the_contents_of_a_scene_are_counted() {

@@ -115,6 +115,40 @@ pub enum Material<R> {
         /// Coverage in `[0, 1]`: the share of rays which the surface stops.
         opacity: Value<f32, R>,
     },
+    /// A material whose normals are turned as if its surface were raised by a texture.
+    Bump {
+        /// What is raised.
+        material: R,
+        /// The texture whose number is the height.
+        height: R,
+        /// Metres of a height of 1; negative turns hills into hollows.
+        #[serde(default = "centimetre")]
+        strength: f32,
+    },
+    /// A material whose normals a texture holds, in the frame of the surface coordinates: red along u, green along
+    /// v, blue outwards, each from −1 at black to 1 at white.
+    NormalMap {
+        /// What has these normals.
+        material: R,
+        /// The texture; an image of data, with `encoding: Linear`.
+        map: R,
+        /// Factor on red and green: 0 is flat.
+        #[serde(default = "full")]
+        strength: f32,
+        /// Whether green grows with v or against it.
+        #[serde(default)]
+        green: Green,
+    },
+}
+
+/// Which way the green channel of a normal map points.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+pub enum Green {
+    /// Along v, as in OpenGL, glTF and Blender.
+    #[default]
+    Up,
+    /// Against v, as in DirectX and Unreal.
+    Down,
 }
 
 /// Absorption inside a solid, by its colour after a distance.
@@ -206,6 +240,17 @@ impl<R> Material<R> {
                 material: materials(material)?,
                 opacity: opacity.map_ref(textures)?,
             },
+            Self::Bump { material, height, strength } => Material::Bump {
+                material: materials(material)?,
+                height: textures(height)?,
+                strength,
+            },
+            Self::NormalMap { material, map, strength, green } => Material::NormalMap {
+                material: materials(material)?,
+                map: textures(map)?,
+                strength,
+                green,
+            },
         })
     }
 }
@@ -226,5 +271,11 @@ fn glass_ior() -> f32 {
     1.5
 }
 fn one_metre() -> f32 {
+    1.0
+}
+fn centimetre() -> f32 {
+    0.01
+}
+fn full() -> f32 {
     1.0
 }

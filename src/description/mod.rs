@@ -18,7 +18,7 @@ mod waves;
 pub use camera::{Camera, Focus, SENSOR_HEIGHT};
 pub use diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
 pub use light::{Emission, EmissionStrength, Light};
-pub use material::{Attenuation, Material, Metal};
+pub use material::{Attenuation, Green, Material, Metal};
 pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
@@ -27,6 +27,9 @@ pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
-pub use texture::{Channel, Encoding, ImageData, ImagePixels, Texture, TextureFilter, Wrap};
+pub use texture::{
+    CellFeature, Channel, Encoding, ImageData, ImagePixels, SceneTexture, Texture, TextureFilter,
+    TextureFiltering, Wrap,
+};
 pub use value::{Rgb, Value};
 pub use waves::{Wave, Waves};

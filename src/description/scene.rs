@@ -1,8 +1,8 @@
 //! A whole scene as plain, validated data.
 
 use super::{
-    Acceleration, Camera, Clock, Diagnostics, Emission, ImageData, Keyframes, Light, LookAt,
-    Material, RenderSettings, Shape, Texture, Transform, TriangleMesh, Velocity, Waves,
+    Acceleration, Camera, Clock, Diagnostics, Emission, Keyframes, Light, LookAt, Material,
+    RenderSettings, SceneTexture, Shape, Transform, TriangleMesh, Velocity, Waves,
 };
 use indexmap::IndexMap;
 use std::path::PathBuf;
@@ -27,7 +27,7 @@ pub struct SceneDescription {
     /// The name of the camera entity to look through; there is always one.
     pub camera: String,
     /// Textures by name, with their images decoded.
-    pub textures: IndexMap<String, Texture<Arc<ImageData>>>,
+    pub textures: IndexMap<String, SceneTexture>,
     /// Materials by name.
     pub materials: IndexMap<String, Material<String>>,
     /// Meshes by name.

@@ -1,6 +1,6 @@
 //! The clock and the settings of a render.
 
-use super::{Caustics, PhotonSettings};
+use super::{Caustics, PhotonSettings, TextureFiltering};
 use serde::{Deserialize, Serialize};
 
 /// The frames of a scene and when they are taken.
@@ -67,6 +67,9 @@ pub struct RenderSettings {
     /// How much work goes into the trees of meshes. Trades time and memory before the first ray for
     /// the time of every ray; the picture is the same.
     pub bvh: BvhQuality,
+    /// What is done about textures which are finer than what a sample stands for. Trades sharpness at a slant and
+    /// time for noise.
+    pub texture_filter: TextureFiltering,
     /// Exposure in stops: the picture is multiplied by `2^exposure` before the tone curve.
     pub exposure: f32,
     /// The tone curve of the PNG; the EXR stays linear.
@@ -95,6 +98,7 @@ impl Default for RenderSettings {
             clamp_indirect: None,
             motion_tolerance: 0.001,
             bvh: BvhQuality::default(),
+            texture_filter: TextureFiltering::default(),
             exposure: 0.0,
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],

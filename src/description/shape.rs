@@ -1,5 +1,6 @@
 //! Shapes, as a scene file says them.
 
+use super::Rgb;
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
@@ -82,7 +83,7 @@ impl<R> Shape<R> {
 
 /// Triangles with shared vertices, in metres.
 ///
-/// `normals` and `uvs` are empty or as long as `positions`. Counter-clockwise triangles face the
+/// `normals`, `uvs` and `colors` are empty or as long as `positions`. Counter-clockwise triangles face the
 /// viewer. `v` grows upwards in an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -92,6 +93,8 @@ pub struct TriangleMesh {
     pub normals: Vec<glam::Vec3>,
     /// Texture coordinates, or empty: (0, 0), (1, 0), (1, 1) on every triangle.
     pub uvs: Vec<glam::Vec2>,
+    /// Linear colours of the vertices, or empty: white.
+    pub colors: Vec<Rgb>,
     /// Three vertex indices per triangle, all in range.
     pub triangles: Vec<[u32; 3]>,
 }

@@ -32,12 +32,12 @@ pub struct Emissions {
 }
 
 impl Emissions {
-    /// Whether an emission, by index or [`super::NOTHING`], looks at uv.
-    pub fn is_textured(&self, emission: u32) -> bool {
-        let emission = self.list.get(emission as usize);
-        emission.is_some_and(|emission| {
-            matches!(emission.strength, EmissionStrength::Radiance(Value::Texture(_)))
-        })
+    /// The texture that an emission, by index or [`super::NOTHING`], looks at.
+    pub fn texture(&self, emission: u32) -> Option<u32> {
+        match self.list.get(emission as usize)?.strength {
+            EmissionStrength::Radiance(Value::Texture(texture)) => Some(texture),
+            _ => None,
+        }
     }
 }
 

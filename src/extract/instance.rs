@@ -2,6 +2,7 @@
 
 use super::Meshes;
 use crate::math::{Aabb, MotionTransform};
+use crate::shade::TextureNeeds;
 use crate::shape::Primitive;
 use crate::world::{Shape, ShutterMotion};
 use glam::{DAffine3, DMat3, DVec3};
@@ -35,6 +36,10 @@ pub struct Instance {
     pub object_id: u32,
     /// Whether its material or emission looks at uv.
     pub needs_uv: bool,
+    /// What its textures need to know of a point beside uv.
+    pub needs: TextureNeeds,
+    /// What the canonical space of its shape is stretched by to become that of the object; 1 for a mesh.
+    pub size: DVec3,
     /// Whether camera rays pass through it.
     pub hidden_from_camera: bool,
 }
@@ -51,6 +56,7 @@ pub(super) struct Place {
 /// What changes of an instance when it moves.
 pub(super) struct Placed {
     pub geometry: Geometry,
+    pub size: DVec3,
     pub motion: MotionTransform,
     pub bounds: Aabb,
     pub place: Place,
@@ -112,7 +118,7 @@ pub(super) fn placed(
         Geometry::Primitive(Primitive::Plane) => bounds,
         _ => shutter_bounds(&bounds, &keys, &motion),
     };
-    Some(Placed { geometry, motion, bounds, place })
+    Some(Placed { geometry, size: scale, motion, bounds, place })
 }
 
 fn canonical(primitive: Primitive, scale: DVec3) -> (Geometry, DVec3, Aabb) {
@@ -203,6 +209,8 @@ mod tests {
                 emission: NOTHING,
                 object_id: 1,
                 needs_uv: false,
+                needs: TextureNeeds::default(),
+                size: DVec3::ONE,
                 hidden_from_camera: false,
             };
             seen += usize::from(instance.motion != after.motion);

@@ -4,6 +4,7 @@ use super::instance::{Instance, NOTHING, Place, Placed, placed};
 use super::{Emissions, FrameOrigin, SurfaceSlots, Surfaces, spawn_order};
 use crate::description::TriangleMesh;
 use crate::math::Aabb;
+use crate::shade::TextureNeeds;
 use crate::world::{
     Deformation, Emission, HiddenFromCamera, MadeOf, Material, Mesh, Name, Shape, ShutterMotion,
     VertexMotion, Vertices,
@@ -287,7 +288,7 @@ fn write_all(table: &mut Instances, objects: &ObjectQuery, meshes: &Meshes, scen
         {
             table.dangling.push(format!("{entity} is made of {shared}, which has no material"));
         }
-        let Some(Placed { geometry, motion, bounds, place }) = placed else { continue };
+        let Some(Placed { geometry, size, motion, bounds, place }) = placed else { continue };
         let material = match made_of {
             Some(MadeOf(shared)) => Some(*shared),
             None => own_material.then_some(entity),
@@ -298,8 +299,10 @@ fn write_all(table: &mut Instances, objects: &ObjectQuery, meshes: &Meshes, scen
             None => scene.surfaces.default_material,
         };
         let emission = if emits { scene.emissions.slots[&entity] } else { NOTHING };
-        let needs_uv =
-            scene.surfaces.is_textured(material) || scene.emissions.is_textured(emission);
+        let textures = scene.surfaces.materials.textures();
+        let emitted = scene.emissions.texture(emission).map(|texture| textures.needs(texture));
+        let needs = [scene.surfaces.needs(material), emitted].into_iter().flatten();
+        let needs = needs.reduce(TextureNeeds::and);
         let object_id = ids[&entity];
         table.moving += usize::from(!motion.is_static());
         table.slots.insert(entity, table.list.len() as u32);
@@ -312,7 +315,9 @@ fn write_all(table: &mut Instances, objects: &ObjectQuery, meshes: &Meshes, scen
             material,
             emission,
             object_id,
-            needs_uv,
+            needs_uv: needs.is_some(),
+            needs: needs.unwrap_or_default(),
+            size,
             hidden_from_camera: hidden,
         });
     }

@@ -50,8 +50,9 @@ mod tests {
     use crate::extract::NOTHING;
     use crate::math::MotionTransform;
     use crate::sampling::Sampler;
+    use crate::shade::TextureNeeds;
     use crate::shape::Primitive;
-    use glam::Vec3;
+    use glam::{DVec3, Vec3};
 
     /// Oracle: every pair by itself.
     #[test]
@@ -75,6 +76,8 @@ mod tests {
                     emission: NOTHING,
                     object_id: 1,
                     needs_uv: false,
+                    needs: TextureNeeds::default(),
+                    size: DVec3::ONE,
                     hidden_from_camera: false,
                 }
             })

@@ -1,11 +1,12 @@
 //! Materials and textures as tables.
 
 use super::spawn_order;
-use crate::description::{Rgb, Value};
-use crate::shade::{MaterialTable, material_cycle};
-use crate::world::{Material, Texture};
+use crate::description::{ImageData, Rgb, Value};
+use crate::shade::{MaterialTable, TextureNeeds, Textures, cycle, material_cycle};
+use crate::world::{Material, Settings, Texture};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
+use std::sync::Arc;
 
 /// What surfaces are made of, by index.
 #[derive(Resource)]
@@ -14,31 +15,32 @@ pub struct Surfaces {
     pub materials: MaterialTable,
     /// Index of the grey of objects which have no material and emit nothing.
     pub default_material: u32,
-    /// Materials which look at uv, by index.
-    textured: Vec<bool>,
+    /// What the textures of a material need to know, by index; `None` where there are none.
+    needs: Vec<Option<TextureNeeds>>,
     /// What refers to an entity which is not what it should be, in words.
     pub dangling: Vec<String>,
 }
 
 impl Default for Surfaces {
     fn default() -> Self {
-        Self::new(Vec::new(), Vec::new())
+        Self::new(Vec::new(), Textures::default())
     }
 }
 
 impl Surfaces {
-    fn new(mut materials: Vec<crate::description::Material<u32>>, textures: Vec<Texture>) -> Self {
+    fn new(mut materials: Vec<crate::description::Material<u32>>, textures: Textures) -> Self {
         let default_material = materials.len() as u32;
         let grey = Value::Constant(Rgb::splat(0.5));
         materials.push(crate::description::Material::Diffuse { albedo: grey });
-        let textured = materials.iter().map(is_textured).collect();
+        let needs = needs_of(&materials, &textures);
         let materials = MaterialTable::new(&materials, textures);
-        Self { materials, default_material, textured, dangling: Vec::new() }
+        Self { materials, default_material, needs, dangling: Vec::new() }
     }
 
-    /// Whether a material, by index or [`super::NOTHING`], looks at uv.
-    pub fn is_textured(&self, material: u32) -> bool {
-        self.textured.get(material as usize).is_some_and(|textured| *textured)
+    /// What the textures of a material, by index or [`super::NOTHING`], need to know of a point beside
+    /// uv; `None` where it looks at no texture.
+    pub fn needs(&self, material: u32) -> Option<TextureNeeds> {
+        self.needs.get(material as usize).copied().flatten()
     }
 }
 
@@ -46,9 +48,42 @@ impl Surfaces {
 const BLACK: crate::description::Material<u32> =
     crate::description::Material::Mirror { reflectance: Value::Constant(Rgb::ZERO) };
 
-/// Whether a material reads a texture, or refers to another material, which may.
-fn is_textured(material: &crate::description::Material<u32>) -> bool {
-    material.clone().map_refs::<(), ()>(&mut |_| Err(()), &mut |_| Err(())).is_err()
+/// What the textures of each material need, those of the materials that it is made of included.
+fn needs_of(
+    materials: &[crate::description::Material<u32>],
+    textures: &Textures,
+) -> Vec<Option<TextureNeeds>> {
+    let mut needs: Vec<Option<TextureNeeds>> = vec![None; materials.len()];
+    for (index, need) in needs.iter_mut().enumerate() {
+        let mut open = vec![index as u32];
+        while let Some(part) = open.pop() {
+            let mut texture = |texture: u32| {
+                *need = Some(need.unwrap_or_default().and(textures.needs(texture)));
+                Ok::<_, std::convert::Infallible>(())
+            };
+            let mut material = |material: u32| {
+                open.push(material);
+                Ok(())
+            };
+            let Ok(_) = materials[part as usize].clone().map_refs(&mut texture, &mut material);
+        }
+    }
+    needs
+}
+
+/// A texture whose references are indices.
+type IndexedTexture = crate::description::Texture<Arc<ImageData>, u32>;
+
+/// Stands in for a texture which cannot be.
+const BLACK_TEXTURE: IndexedTexture = crate::description::Texture::Gradient {
+    a: Value::Constant(Rgb::ZERO),
+    b: Value::Constant(Rgb::ZERO),
+};
+
+/// A texture which refers to itself, if there is one.
+fn texture_cycle(textures: &[IndexedTexture]) -> Option<u32> {
+    let parts = |index: u32| textures[index as usize].refs().map(|(_, part)| *part).collect();
+    cycle(textures.len() as u32, parts)
 }
 
 /// Which entity became which index in [`Surfaces`].
@@ -65,6 +100,7 @@ pub struct SurfaceSlots {
 /// Slots follow the order of the entities, which is that of spawning.
 pub fn extract_surfaces(
     changed: Query<(), Or<(Changed<Material>, Changed<Texture>)>>,
+    settings: Res<Settings>,
     mut removed: (RemovedComponents<Material>, RemovedComponents<Texture>),
     materials: Query<(Entity, &Material)>,
     textures: Query<(Entity, &Texture)>,
@@ -72,9 +108,12 @@ pub fn extract_surfaces(
     mut slots: ResMut<SurfaceSlots>,
 ) {
     let gone = removed.0.read().count() + removed.1.read().count();
-    if changed.is_empty() && gone == 0 {
+    let filtering = settings.0.texture_filter;
+    let textures_now = surfaces.materials.textures();
+    if changed.is_empty() && gone == 0 && textures_now.filtering() == filtering {
         return;
     }
+    let pyramids = textures_now.pyramids();
     let texture_slots = in_spawn_order(textures.iter().map(|(entity, _)| entity));
     let mut dangling = Vec::new();
     let texture_of = |entity: Entity| {
@@ -103,13 +142,25 @@ pub fn extract_surfaces(
         dangling.push(format!("the material{name} is mixed of itself"));
         table[looped as usize] = BLACK;
     }
-    let mut images: Vec<(u32, Texture)> = textures
-        .iter()
-        .map(|(entity, texture)| (texture_slots[&entity], texture.clone()))
-        .collect();
-    images.sort_unstable_by_key(|(slot, _)| *slot);
-    let images: Vec<Texture> = images.into_iter().map(|(_, texture)| texture).collect();
-    *surfaces = Surfaces { dangling, ..Surfaces::new(table, images) };
+    let mut list: Vec<(u32, IndexedTexture)> = Vec::with_capacity(textures.iter().len());
+    for (entity, texture) in &textures {
+        let image = |image, _| Ok(image);
+        let indexed = texture.clone().map_refs(image, &mut { texture_of }).unwrap_or_else(|what| {
+            dangling.push(format!("the texture of {entity} refers to {what}"));
+            BLACK_TEXTURE
+        });
+        list.push((texture_slots[&entity], indexed));
+    }
+    list.sort_unstable_by_key(|(slot, _)| *slot);
+    let mut list: Vec<IndexedTexture> = list.into_iter().map(|(_, texture)| texture).collect();
+    while let Some(looped) = texture_cycle(&list) {
+        let entity = textures.iter().map(|(e, _)| e).find(|e| texture_slots[e] == looped);
+        let name = entity.map_or_else(String::new, |e| format!(" of {e}"));
+        dangling.push(format!("the texture{name} is made of itself"));
+        list[looped as usize] = BLACK_TEXTURE;
+    }
+    let textures = Textures::new(list, filtering, &pyramids);
+    *surfaces = Surfaces { dangling, ..Surfaces::new(table, textures) };
     slots.set_if_neq(SurfaceSlots { materials: material_slots, textures: texture_slots });
 }
 

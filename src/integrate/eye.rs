@@ -29,7 +29,7 @@ use crate::build::photon::{PhotonMap, QueryPoint};
 use crate::description::{DirectLight, PhotonSettings, Rgb};
 use crate::extract::{CameraRay, Method, NOTHING};
 use crate::film::PixelSample;
-use crate::math::{Ray, offset_ray_origin};
+use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
@@ -119,6 +119,8 @@ enum Since {
 #[derive(Clone, Copy)]
 struct Walk<I> {
     ray: Ray,
+    /// What of the scene the path stands for.
+    cone: Cone,
     throughput: Rgb,
     eta_scale: f32,
     arrival: Arrival,
@@ -157,6 +159,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     ) -> (PixelSample, Gathered) {
         let walk = Walk {
             ray: camera_ray.ray,
+            cone: self.path.pixel,
             throughput: Rgb::ONE,
             eta_scale: 1.0,
             arrival: Arrival::Sure,
@@ -219,11 +222,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     ) -> bool {
         let scene = &self.path.scene;
         walk.length += hit.t;
+        walk.cone.advance(hit.t);
         if I::ABSORBS {
             walk.throughput *= self.path.transmittance(&walk.inside, hit.t);
         }
         let counters = &mut context.counters.nesting;
-        let (hit, surface, beyond, outside) =
+        let (hit, mut surface, beyond, outside) =
             match scene.nested().meet(&walk.ray, *hit, &mut walk.inside, counters) {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
@@ -240,10 +244,11 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         walk.met += 1;
         let material = scene.geometry.instances[hit.instance as usize].material;
         let wo = -walk.ray.d;
+        let at = scene.geometry.texture_point_in(walk.cone, &walk.ray, hit, &surface);
         let mut roulette = None;
         if OPACITY && material != NOTHING {
             let u = || sampler.one(dimensions + dimension::ROULETTE);
-            let Some(left) = scene.surfaces.materials.stopped(material, surface.uv, u) else {
+            let Some(left) = scene.surfaces.materials.stopped(material, &at, u) else {
                 walk.ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, walk.ray.d);
                 return true;
             };
@@ -259,7 +264,13 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         }
         let mut lobe = sampler.one(dimensions + dimension::LOBE);
         let bsdf = (material != NOTHING).then(|| {
-            scene.surfaces.materials.bsdf_within(material, surface.uv, &mut lobe, outside)
+            let materials = &scene.surfaces.materials;
+            let chosen = materials.choose(material, &at, &mut lobe);
+            if let Some(relief) = chosen.relief {
+                let (Walk { cone, ray, .. }, turn) = (&*walk, (materials, relief));
+                scene.geometry.turn_normal(turn, *cone, ray, hit, &mut surface, &at);
+            }
+            materials.chosen_bsdf_within(chosen.material, &at, outside)
         });
         if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
             let ray = &walk.ray;
@@ -429,6 +440,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         walk.eta_scale *= drawn.eta * drawn.eta;
         walk.depth += 1;
         walk.inside = *sides.towards(wi, vertex);
+        self.path.widen(&mut walk.cone, drawn);
         walk.since = match (diffuse, walk.since) {
             (true, _) => Since::Diffuse,
             (false, Since::Never) => Since::Never,

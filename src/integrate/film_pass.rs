@@ -3,10 +3,11 @@
 use super::photon_passes::PhotonReport;
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
-use crate::description::RenderSettings;
+use crate::description::{RenderSettings, TextureFiltering};
 use crate::extract::{CameraRay, Feature, FrameOrigin, Requirements};
 use crate::film::{Film, FilmError, FilterSampler, Tile, TileBuffer};
 use crate::frame::RenderControl;
+use crate::math::Cone;
 use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::{Clear, Inside, OneSolid, SolidStack};
 use crate::world::{FrameClock, Settings};
@@ -164,6 +165,19 @@ impl<'a> Begin<'a> {
         (eye.max - eye.min == Vec3::ZERO).then(|| I::new(&self.scene.nested().around(eye.min, 0.0)))
     }
 
+    /// What a sample stands for at the camera, half way through the shutter: the more samples, the less, down to
+    /// an eighth of a pixel across (Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed.,
+    /// section 10.1.3).
+    fn pixel(&self) -> Cone {
+        let textures = self.scene.surfaces.materials.textures();
+        if textures.filtering() == TextureFiltering::Point || textures.is_empty() {
+            return Cone::default();
+        }
+        let (side, growth) = self.scene.camera.pixel_size(0.5);
+        let share = (self.settings.samples as f32).sqrt().recip().max(0.125);
+        Cone { width: side as f32 * share, spread: growth as f32 * share }
+    }
+
     pub(super) fn tracer<const OPACITY: bool, I: Inside>(&self) -> PathTracer<'a, OPACITY, I> {
         PathTracer {
             scene: self.scene,
@@ -173,6 +187,8 @@ impl<'a> Begin<'a> {
             clamp_indirect: self.settings.clamp_indirect,
             wants_first_hit: self.first_hit,
             origin: self.origin.0,
+            pixel: self.pixel(),
+            samples: self.settings.samples,
             start: self.start(),
         }
     }

@@ -22,10 +22,10 @@ use crate::build::nesting::Meeting;
 use crate::description::Rgb;
 use crate::extract::{CameraRay, NOTHING};
 use crate::film::{FirstHit, PixelSample};
-use crate::math::{Ray, offset_ray_origin};
+use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::nesting::{Inside, NestingFaults};
-use crate::shade::{Bsdf, BsdfSample};
+use crate::shade::{Bsdf, BsdfSample, TexturePoint};
 use glam::{DVec3, Vec2, Vec3};
 
 /// The path tracer with its settings.
@@ -48,6 +48,10 @@ pub struct PathTracer<'a, const OPACITY: bool, I> {
     pub wants_first_hit: bool,
     /// World position of the origin of render space.
     pub origin: DVec3,
+    /// What a sample stands for at the camera; a ray where no texture is filtered.
+    pub pixel: Cone,
+    /// Samples of a pixel.
+    pub samples: u32,
     /// What camera rays begin in; `None` where it depends on the ray.
     pub start: Option<I>,
 }
@@ -87,6 +91,8 @@ pub(super) enum Arrival {
 /// A path on its way.
 struct Path<'a, I> {
     ray: Ray,
+    /// What of the scene the path stands for.
+    cone: Cone,
     radiance: Rgb,
     throughput: Rgb,
     /// Product of the η² by which refraction has scaled the throughput so far, inverted.
@@ -110,9 +116,10 @@ struct Path<'a, I> {
 }
 
 impl<'a, I> Path<'a, I> {
-    fn new(camera_ray: &CameraRay, inside: I) -> Self {
+    fn new(camera_ray: &CameraRay, pixel: Cone, inside: I) -> Self {
         Self {
             ray: camera_ray.ray,
+            cone: pixel,
             radiance: Rgb::ZERO,
             throughput: Rgb::ONE,
             eta_scale: 1.0,
@@ -197,7 +204,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> PixelSample {
-        let mut path = Path::new(camera_ray, self.start(&camera_ray.ray));
+        let mut path = Path::new(camera_ray, self.pixel, self.start(&camera_ray.ray));
         self.follow::<false>(&mut path, camera_ray, sampler, counters);
         PixelSample { radiance: path.radiance, first_hit: path.first_hit }
     }
@@ -209,7 +216,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> SharedPath<'a> {
-        let mut path = Path::new(camera_ray, self.start(&camera_ray.ray));
+        let mut path = Path::new(camera_ray, self.pixel, self.start(&camera_ray.ray));
         self.follow::<true>(&mut path, camera_ray, sampler, counters);
         let Path { radiance, first_hit, departure, mut landing, before, boost, .. } = path;
         let radiance = match &mut landing {
@@ -242,8 +249,9 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 self.escape(path, counters);
                 break;
             };
+            path.cone.advance(hit.t);
             let met = self.meet(path, hit, counters);
-            let (hit, surface, beyond, outside) = match met {
+            let (hit, mut surface, beyond, outside) = match met {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
                 }
@@ -258,10 +266,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             let instance = &self.scene.geometry.instances[hit.instance as usize];
             let materials = &self.scene.surfaces.materials;
             let wo = -path.ray.d;
+            let at = self.scene.geometry.texture_point_in(path.cone, &path.ray, &hit, &surface);
             let mut roulette = None;
             if OPACITY && instance.material != NOTHING {
                 let u = || sampler.one(dimensions + dimension::ROULETTE);
-                let Some(left) = materials.stopped(instance.material, surface.uv, u) else {
+                let Some(left) = materials.stopped(instance.material, &at, u) else {
                     path.pass(&surface);
                     continue;
                 };
@@ -280,11 +289,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             } else {
                 0.0
             };
-            let bsdf = if I::NESTS {
-                materials.bsdf_within(instance.material, surface.uv, &mut lobe, outside)
-            } else {
-                materials.bsdf(instance.material, surface.uv, &mut lobe)
-            };
+            let bsdf = self.bsdf(path, &hit, &mut surface, &at, outside, &mut lobe);
             self.note_first_hit(path, camera_ray, &hit, &surface, Some(&bsdf));
             if path.depth == self.max_depth {
                 counters.truncated += 1;
@@ -316,6 +321,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             path.depth += 1;
             path.eta_scale *= sample.eta * sample.eta;
             path.inside = *sides.towards(wi, &vertex);
+            self.widen(&mut path.cone, &sample);
             if path.depth >= self.roulette_depth {
                 let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
                 if !path.survives::<SHARE>(u, self.roulette_gain) {
@@ -341,6 +347,39 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         }
         let Path { ray, inside, .. } = path;
         self.scene.nested().meet(ray, hit, inside, &mut counters.nesting)
+    }
+
+    /// How the surface scatters that a path has met, with the relief of its material.
+    #[inline]
+    fn bsdf(
+        &self,
+        path: &Path<'a, I>,
+        hit: &Hit,
+        surface: &mut SurfacePoint,
+        at: &TexturePoint,
+        outside: Option<u32>,
+        lobe: &mut f32,
+    ) -> Bsdf<'a> {
+        let SceneView { geometry, surfaces, .. } = self.scene;
+        let materials = &surfaces.materials;
+        let material = geometry.instances[hit.instance as usize].material;
+        let chosen = materials.choose(material, at, lobe);
+        if let Some(relief) = chosen.relief {
+            geometry.turn_normal((materials, relief), path.cone, &path.ray, hit, surface, at);
+        }
+        if I::NESTS {
+            materials.chosen_bsdf_within(chosen.material, at, outside)
+        } else {
+            materials.chosen_bsdf(chosen.material, at)
+        }
+    }
+
+    /// What of the scene a path stands for that was scattered.
+    #[inline]
+    pub(super) fn widen(&self, cone: &mut Cone, sample: &BsdfSample) {
+        if !cone.is_ray() && !sample.delta {
+            cone.scatter(sample.pdf, self.samples as f32);
+        }
     }
 
     /// Ends a path which meets nothing.
@@ -419,7 +458,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         arrival: Arrival,
     ) -> Rgb {
         let lights = &self.scene.lights;
-        let radiance = lights.emitted(hit.instance, surface, wo);
+        let radiance = lights.emitted(hit.instance, surface, wo, time);
         match arrival {
             Arrival::Drawn { from, pdf } if radiance != Rgb::ZERO => {
                 let light_pdf =
@@ -488,7 +527,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                     if material == NOTHING || !materials.has_opacity(material) {
                         return 0.0;
                     }
-                    passed *= 1.0 - materials.opacity(material, surface.uv);
+                    let at = self.scene.geometry.texture_point(hit.instance, &surface, ray.time);
+                    passed *= 1.0 - materials.opacity(material, &at);
                     if passed == 0.0 {
                         return 0.0;
                     }

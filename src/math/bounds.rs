@@ -48,6 +48,11 @@ impl Aabb {
         self.min.abs().max(self.max.abs()).max_element()
     }
 
+    /// Metres from corner to corner; not finite for a box without end, 0 for an empty one.
+    pub fn diagonal(&self) -> f64 {
+        if self.is_empty() { 0.0 } else { (self.max.as_dvec3() - self.min.as_dvec3()).length() }
+    }
+
     /// Surface area of the box, 0 for an empty one.
     pub fn area(&self) -> f32 {
         if self.is_empty() {

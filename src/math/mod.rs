@@ -1,6 +1,7 @@
 //! Frames, bounds, rounding bounds and rigid motion: geometry that knows nothing of light.
 
 mod bounds;
+mod cone;
 mod frame;
 mod motion;
 mod ray;
@@ -8,6 +9,7 @@ mod ray;
 mod rounding;
 
 pub use bounds::Aabb;
+pub use cone::Cone;
 pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
 pub use ray::Ray;

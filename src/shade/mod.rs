@@ -20,5 +20,7 @@ pub use bsdf::{
     Bsdf, BsdfSample, BsdfValue, Diffuse, Mirror, Principled, RoughConductor, RoughDielectric,
     RoughPlastic, SmoothConductor, SmoothDielectric, SmoothPlastic, ThinGlass, TransportMode,
 };
-pub use material::{Interior, MaterialTable, material_cycle};
-pub use texture::RenderTexture;
+pub use material::{
+    Chosen, Interior, MaterialTable, Surroundings, bent_normal, cycle, material_cycle,
+};
+pub use texture::{Pyramids, RenderTexture, TextureNeeds, TexturePoint, Textures};

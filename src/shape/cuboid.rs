@@ -33,14 +33,14 @@ pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
 }
 
 /// The normal of a face.
-fn normal(face: u32) -> DVec3 {
+pub(super) fn normal(face: u32) -> DVec3 {
     let sign = if face & 1 == 1 { 1.0 } else { -1.0 };
     DVec3::AXES[(face / 2) as usize] * sign
 }
 
 /// The direction in which u grows on a face: to the right as seen from outside, +y (or, on top, −z)
 /// up.
-fn right(face: u32) -> DVec3 {
+pub(super) fn right(face: u32) -> DVec3 {
     [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::X, DVec3::NEG_X, DVec3::X][face as usize]
 }
 

@@ -9,6 +9,7 @@
 mod cone;
 mod cuboid;
 mod cylinder;
+mod derivatives;
 mod disk;
 mod plane;
 mod rectangle;
@@ -19,6 +20,7 @@ pub use rectangle::{RectangleSampler, sample_solid_angle as sample_rectangle};
 pub use sphere::{ConeOfSphere, sample_cone as sample_sphere};
 pub use triangle::{TriangleTest, area_of as triangle_area, sample_triangle, triangle_pdf};
 
+use crate::description::Rgb;
 use crate::math::{Aabb, gamma_f64};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
@@ -60,11 +62,20 @@ pub struct LocalSurface {
     pub uv: Vec2,
     /// Direction in which u grows; may be 0.
     pub dpdu: DVec3,
+    /// Colour of a mesh, interpolated between its corners; 1 of all else.
+    pub color: Rgb,
 }
 
 impl LocalSurface {
     fn smooth(p: DVec3, normal: DVec3, uv: (f64, f64), dpdu: DVec3) -> Self {
-        Self { p, ng: normal, ns: normal, uv: Vec2::new(uv.0 as f32, uv.1 as f32), dpdu }
+        Self {
+            p,
+            ng: normal,
+            ns: normal,
+            uv: Vec2::new(uv.0 as f32, uv.1 as f32),
+            dpdu,
+            color: Rgb::ONE,
+        }
     }
 }
 

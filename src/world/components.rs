@@ -18,7 +18,7 @@ pub use description::{Acceleration, Keyframes, LookAt, Transform, Velocity};
 /// What a surface is made of.
 pub type Material = description::Material<Entity>;
 /// A texture.
-pub type Texture = description::Texture<Arc<ImageData>>;
+pub type Texture = description::Texture<Arc<ImageData>, Entity>;
 /// The form of an object.
 pub type Shape = description::Shape<Entity>;
 /// Light which leaves the surface of a shape.

@@ -68,8 +68,8 @@ impl VertexMotion {
         let bounds = Aabb::from_points(points);
         let mut keys = keys.into_iter();
         let Vertices { positions, normals } = keys.next().expect("a motion has a first key");
-        let TriangleMesh { uvs, triangles, .. } = (**rest.data()).clone();
-        let opening = Arc::new(TriangleMesh { positions, normals, uvs, triangles });
+        let TriangleMesh { uvs, colors, triangles, .. } = (**rest.data()).clone();
+        let opening = Arc::new(TriangleMesh { positions, normals, uvs, colors, triangles });
         Self { opening, later: Arc::new(keys.collect()), bounds, made_for: Some(made_for) }
     }
 

@@ -4,10 +4,11 @@ use super::{
     ActiveCamera, Camera, ChildOf, Deformation, Emission, FrameClock, HiddenFromCamera, Light,
     MadeOf, Material, Mesh, Name, Settings, Shape, Texture,
 };
-use crate::description::{EntityDescription, SceneDescription};
+use crate::description::{EntityDescription, ImageData, SceneDescription};
 use bevy_ecs::prelude::*;
 use indexmap::IndexMap;
 use std::convert::Infallible;
+use std::sync::Arc;
 
 /// The entities of a scene by their names, in the order of the file.
 #[derive(Clone, Debug)]
@@ -43,7 +44,9 @@ pub fn spawn_scene(world: &mut World, scene: &SceneDescription) -> SceneEntities
     let camera = entity(&entities, &scene.camera);
     let spawned = SceneEntities { camera, textures, materials, meshes, entities };
     for (name, texture) in &scene.textures {
-        let texture: Texture = texture.clone();
+        let image = |image: Arc<ImageData>, _| Ok(image);
+        let mut part = |name: String| Ok(entity(&spawned.textures, &name));
+        let texture: Texture = sure(texture.clone().map_refs(image, &mut part));
         world.entity_mut(spawned.textures[name]).insert(texture);
     }
     for (name, mesh) in &scene.meshes {

@@ -10,6 +10,7 @@ mod geometry;
 mod mesh_tree;
 mod resting;
 mod surface;
+mod texture_point;
 mod top;
 mod tree;
 mod wide;

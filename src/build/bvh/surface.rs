@@ -3,7 +3,7 @@
 use super::resting::point_error;
 use super::top::Joined;
 use super::{Hit, MeshTree, SceneGeometry};
-use crate::description::TriangleMesh;
+use crate::description::{Rgb, TriangleMesh};
 use crate::extract::{Geometry, Instance};
 use crate::math::{Frame, MotionTransform, Ray};
 use crate::shape::{LocalSurface, rounding_error};
@@ -24,6 +24,8 @@ pub struct SurfacePoint {
     pub uv: Vec2,
     /// Direction in which u grows, of any length; may be 0.
     pub dpdu: Vec3,
+    /// Colour of a mesh, interpolated between its corners; 1 of all else.
+    pub color: Rgb,
 }
 
 impl SurfacePoint {
@@ -44,7 +46,15 @@ impl SurfacePoint {
         let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
         let ns = if ns.is_finite() { ns } else { ng };
         let dpdu = forward.transform_vector3(local.dpdu);
-        Self { p, p_error, ng: ng.as_vec3(), ns: ns.as_vec3(), uv: local.uv, dpdu: dpdu.as_vec3() }
+        Self {
+            p,
+            p_error,
+            ng: ng.as_vec3(),
+            ns: ns.as_vec3(),
+            uv: local.uv,
+            dpdu: dpdu.as_vec3(),
+            color: local.color,
+        }
     }
 
     /// The shading frame around `ns`. No material yet distinguishes a direction of the tangent plane.
@@ -114,14 +124,14 @@ impl Joined {
             .filter(|n| n.is_finite())
             .map_or(ng, DVec3::as_vec3);
         let ns = if ns.dot(ng) < 0.0 { -ns } else { ns };
-        let (uv, dpdu) = if instance.needs_uv {
+        let (uv, dpdu, color) = if instance.needs_uv {
             facet.parameters(&tree.mesh, hit.primitive, hit.weights)
         } else {
-            (Vec2::ZERO, DVec3::ZERO)
+            (Vec2::ZERO, DVec3::ZERO, Rgb::ONE)
         };
         let p = facet.p + self.shift;
         let p_error = point_error(corners, self.shift, p);
-        SurfacePoint { p, p_error, ng, ns, uv, dpdu: dpdu.as_vec3() }
+        SurfacePoint { p, p_error, ng, ns, uv, dpdu: dpdu.as_vec3(), color }
     }
 }
 
@@ -137,17 +147,17 @@ impl MeshTree {
     ) -> LocalSurface {
         let facet = Facet::new(self.corners(triangle, time), weights);
         let ns = interpolated(self.normals(triangle, time), weights).unwrap_or(facet.ng);
-        let (uv, dpdu) = if needs_uv {
+        let (uv, dpdu, color) = if needs_uv {
             facet.parameters(&self.mesh, triangle, weights)
         } else {
-            (Vec2::ZERO, DVec3::ZERO)
+            (Vec2::ZERO, DVec3::ZERO, Rgb::ONE)
         };
-        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu }
+        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu, color }
     }
 }
 
 /// A point of a triangle, with what follows from the corners alone.
-struct Facet {
+pub(super) struct Facet {
     p: DVec3,
     /// Normal of any positive length.
     ng: DVec3,
@@ -157,7 +167,7 @@ struct Facet {
 
 impl Facet {
     #[inline]
-    fn new([a, b, c]: [DVec3; 3], weights: DVec2) -> Self {
+    pub(super) fn new([a, b, c]: [DVec3; 3], weights: DVec2) -> Self {
         let (e1, e2) = (b - a, c - a);
         // The product of two numbers of f32 neither under- nor overflows in f64.
         let ng = e1.cross(e2);
@@ -165,20 +175,41 @@ impl Facet {
         Self { p, ng, e1, e2 }
     }
 
-    /// Texture coordinates, and the direction in which u grows.
-    fn parameters(&self, mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> (Vec2, DVec3) {
-        let uvs = if mesh.uvs.is_empty() {
-            [Vec2::ZERO, Vec2::X, Vec2::ONE]
-        } else {
-            mesh.triangles[triangle as usize].map(|k| mesh.uvs[k as usize])
-        };
-        let [a, b, c] = uvs.map(Vec2::as_dvec2);
+    /// Texture coordinates, the direction in which u grows, and the colour.
+    fn parameters(&self, mesh: &TriangleMesh, triangle: u32, weights: DVec2) -> (Vec2, DVec3, Rgb) {
+        let [a, b, c] = uvs_of(mesh, triangle);
         let uv = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
         let (d1, d2) = (b - a, c - a);
         let det = d1.perp_dot(d2);
         let (e1, e2) = (self.e1, self.e2);
         let dpdu = if det == 0.0 { e1 } else { (e1 * d2.y - e2 * d1.y) * det.signum() };
-        (uv.as_vec2(), dpdu)
+        let color = if mesh.colors.is_empty() {
+            Rgb::ONE
+        } else {
+            let corners = mesh.triangles[triangle as usize];
+            let [a, b, c] = corners.map(|k| mesh.colors[k as usize]);
+            let (second, third) = (weights.x as f32, weights.y as f32);
+            a * (1.0 - second - third) + b * second + c * third
+        };
+        (uv.as_vec2(), dpdu, color)
+    }
+
+    /// `∂p/∂u` and `∂p/∂v`; `None` where the corners have the same uv or lie on a line of it.
+    pub(super) fn derivatives(&self, mesh: &TriangleMesh, triangle: u32) -> Option<[DVec3; 2]> {
+        let [a, b, c] = uvs_of(mesh, triangle);
+        let (d1, d2) = (b - a, c - a);
+        let det = d1.perp_dot(d2);
+        let (e1, e2) = (self.e1, self.e2);
+        (det != 0.0).then(|| [(e1 * d2.y - e2 * d1.y) / det, (e2 * d1.x - e1 * d2.x) / det])
+    }
+}
+
+/// Texture coordinates of the corners of a triangle; half a square where the mesh has none.
+fn uvs_of(mesh: &TriangleMesh, triangle: u32) -> [DVec2; 3] {
+    if mesh.uvs.is_empty() {
+        [DVec2::ZERO, DVec2::X, DVec2::ONE]
+    } else {
+        mesh.triangles[triangle as usize].map(|k| mesh.uvs[k as usize].as_dvec2())
     }
 }
 
@@ -199,6 +230,7 @@ mod tests {
     use crate::extract::{Instance, NOTHING};
     use crate::math::{Aabb, offset_ray_origin};
     use crate::sampling::Sampler;
+    use crate::shade::TextureNeeds;
     use glam::DQuat;
     use std::sync::Arc;
 
@@ -230,6 +262,8 @@ mod tests {
                 emission: NOTHING,
                 object_id: 1,
                 needs_uv: false,
+                needs: TextureNeeds::default(),
+                size: DVec3::ONE,
                 hidden_from_camera: false,
             };
             let instances = [instance];

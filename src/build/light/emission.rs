@@ -182,7 +182,7 @@ impl Emission<'_> {
                 (wi, natural_pdf(wi) * sides / FRAC_1_PI / pdf)
             }
         };
-        let power = self.lights.emitted(instance, surface, wi) * (weight * area as f32);
+        let power = self.lights.emitted(instance, surface, wi, self.time) * (weight * area as f32);
         let o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
         Some(EmittedPhoton { ray: Ray { o, d: wi, time: self.time }, power })
     }

@@ -34,7 +34,9 @@ impl ShapeLight {
         };
         let m = &forward.matrix3;
         match primitive {
-            Primitive::Rectangle if is_perpendicular(m.x_axis, m.y_axis) => {
+            Primitive::Rectangle
+                if is_perpendicular(m.x_axis, m.y_axis) && !instance.needs.place =>
+            {
                 Self::Rectangle(Box::new(RectangleLight::new(forward, inverse)))
             }
             Primitive::Sphere if is_similarity(forward) && !instance.needs_uv => {

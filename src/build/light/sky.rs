@@ -4,11 +4,11 @@
 //! proportional to radiance times the sine of the polar angle, which is what the map's rows stretch
 //! over (Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed., section 12.5).
 
-use crate::description::{ImageData, Rgb, Value};
+use crate::description::{Rgb, Value};
 use crate::math::Frame;
 use crate::sampling::Piecewise2D;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere};
-use crate::shade::{MaterialTable, RenderTexture};
+use crate::shade::{MaterialTable, TexturePoint};
 use glam::{DAffine3, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::Arc;
@@ -29,10 +29,11 @@ impl SkyLight {
     pub fn new(radiance: Value<Rgb, u32>, scale: f32, materials: &MaterialTable) -> Self {
         let texture = match &radiance {
             Value::Constant(_) => None,
-            Value::Texture(texture) => materials.textures().get(*texture as usize),
+            Value::Texture(texture) => Some(*texture),
         };
         let map = texture.map(|texture| {
-            let (width, height) = resolution(texture);
+            let (width, height) = materials.textures().resolution(texture);
+            let (width, height) = (width as usize, height as usize);
             Arc::new(Piecewise2D::new(width, height, |x, y| {
                 // A bilinear lookup shows a texel's neighbours too: the greatest of the corners and
                 // the middle keeps the density above 0 wherever the radiance is.
@@ -41,7 +42,7 @@ impl SkyLight {
                     .map(|(dx, dy)| {
                         let u = (x as f32 + dx) / width as f32;
                         let v = (y as f32 + dy) / height as f32;
-                        let color = materials.color(&radiance, Vec2::new(u, v));
+                        let color = materials.color(&radiance, &seen(Vec2::new(u, v)));
                         f64::from(crate::color::luminance(color))
                     })
                     .fold(0.0, f64::max);
@@ -72,7 +73,12 @@ impl SkyLight {
 
     /// Radiance from a unit direction in the light's own space.
     fn radiance_local(&self, direction: Vec3, materials: &MaterialTable) -> Rgb {
-        materials.color(&self.radiance, direction_to_uv(direction)) * self.scale
+        let at = TexturePoint {
+            p: direction.as_dvec3(),
+            n: -direction,
+            ..TexturePoint::at(direction_to_uv(direction))
+        };
+        materials.color(&self.radiance, &at) * self.scale
     }
 
     /// Radiance from the unit direction `wi` of render space.
@@ -138,15 +144,10 @@ fn jacobian(v: f32) -> Option<f32> {
     (sin > 0.0).then(|| 1.0 / (TAU * PI * sin))
 }
 
-fn resolution(texture: &RenderTexture) -> (usize, usize) {
-    match texture {
-        RenderTexture::Image { file, .. } => {
-            let ImageData { width, height, .. } = **file;
-            (width as usize, height as usize)
-        }
-        // Fine enough for any checker that a picture can show as a sky.
-        RenderTexture::Checker { .. } => (1024, 512),
-    }
+/// What a sky texture looks at: solid ones the unit sphere around the viewer.
+fn seen(uv: Vec2) -> TexturePoint {
+    let direction = uv_to_direction(uv);
+    TexturePoint { p: direction.as_dvec3(), n: -direction, ..TexturePoint::at(uv) }
 }
 
 /// The light's space turned into render space: rotation only, directions stay unit.

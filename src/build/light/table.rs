@@ -11,7 +11,7 @@ use crate::extract::{
     SurfaceEmission, Surfaces,
 };
 use crate::math::Aabb;
-use crate::shade::{MaterialTable, texture};
+use crate::shade::MaterialTable;
 use crate::shape::{Primitive, triangle_area};
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3};
@@ -172,10 +172,11 @@ impl Builder<'_> {
         match value {
             Value::Constant(color) => *color,
             Value::Texture(index) => {
-                let index = *index as usize;
                 let textures = self.materials.textures();
-                let Some(known) = self.table.averages.get_mut(index) else { return Rgb::ZERO };
-                *known.get_or_insert_with(|| texture::average(&textures[index]))
+                let Some(known) = self.table.averages.get_mut(*index as usize) else {
+                    return Rgb::ZERO;
+                };
+                *known.get_or_insert_with(|| textures.average(*index))
             }
         }
     }

@@ -11,7 +11,7 @@ use crate::description::{Light, Rgb};
 use crate::extract::{Geometry, NOTHING, PunctualLight};
 use crate::math::{Ray, gamma, offset_ray_origin};
 use crate::sampling::warp::uniform_cone;
-use crate::shade::MaterialTable;
+use crate::shade::{MaterialTable, TexturePoint};
 use crate::shape::{
     AreaFactor, ConeOfSphere, Primitive, RectangleSampler, sample_rectangle, sample_sphere,
     sample_triangle, triangle_pdf,
@@ -196,10 +196,11 @@ impl Lights<'_> {
 
     /// The radiance which a surface emits from a point towards the unit direction `wo`.
     #[inline]
-    pub fn emitted(&self, instance: u32, surface: &SurfacePoint, wo: Vec3) -> Rgb {
+    pub fn emitted(&self, instance: u32, surface: &SurfacePoint, wo: Vec3, time: f32) -> Rgb {
         match &self.table.emitted[instance as usize] {
             Some(emitted) if emitted.two_sided || surface.ng.dot(wo) > 0.0 => {
-                self.radiance_of(emitted, surface.uv)
+                let at = self.geometry.texture_point(instance, surface, time);
+                self.radiance_of(emitted, &at)
             }
             _ => Rgb::ZERO,
         }
@@ -284,8 +285,8 @@ impl Lights<'_> {
         })
     }
 
-    pub(super) fn radiance_of(&self, emitted: &Emitted, uv: Vec2) -> Rgb {
-        self.materials.color(&emitted.radiance, uv) * emitted.factor
+    pub(super) fn radiance_of(&self, emitted: &Emitted, at: &TexturePoint) -> Rgb {
+        self.materials.color(&emitted.radiance, at) * emitted.factor
     }
 
     pub(super) fn triangle(
@@ -343,7 +344,7 @@ impl Lights<'_> {
             let area = AreaFactor::new(&map.matrix3).at(canonical.ng);
             area_to_solid_angle(shape.pdf_area(face, &map) / area, surface.p - from.p, surface.ng)
         });
-        self.surface_sample(instance, from, &surface, pdf)
+        self.surface_sample(instance, from, &surface, time, pdf)
     }
 
     #[inline]
@@ -361,7 +362,7 @@ impl Lights<'_> {
         let point = rectangle.sample(from.p, u);
         let wi = (point.p - from.p).try_normalize()?.as_vec3();
         let end = ShadowEnd::Surface { p: point.p, p_error: rectangle.p_error, n: rectangle.n };
-        let radiance = self.radiance_of(emitted, point.uv);
+        let radiance = self.radiance_of(emitted, &TexturePoint::at(point.uv));
         Some(LightSample { wi, radiance, pdf: point.pdf as f32, delta: false, end })
     }
 
@@ -381,7 +382,7 @@ impl Lights<'_> {
             p_error: sphere.p_error,
             n: normal.as_vec3(),
         };
-        let radiance = self.radiance_of(emitted, Vec2::ZERO);
+        let radiance = self.radiance_of(emitted, &TexturePoint::at(Vec2::ZERO));
         Some(LightSample { wi: wi.as_vec3(), radiance, pdf: cone.pdf() as f32, delta: false, end })
     }
 
@@ -402,7 +403,7 @@ impl Lights<'_> {
             self.geometry.meshes[mesh as usize].surface(triangle, weights, time, object.needs_uv);
         let surface = SurfacePoint::new(&local, &map, &inverse);
         let pdf = triangle_pdf(from.p, corners, surface.p);
-        self.surface_sample(instance, from, &surface, pdf)
+        self.surface_sample(instance, from, &surface, time, pdf)
     }
 
     /// The sample for a point of an emitting surface drawn with `pdf` per unit solid angle.
@@ -411,10 +412,11 @@ impl Lights<'_> {
         instance: u32,
         from: &Receiver,
         surface: &SurfacePoint,
+        time: f32,
         pdf: f64,
     ) -> Option<LightSample> {
         let wi = (surface.p - from.p).try_normalize()?.as_vec3();
-        let radiance = self.emitted(instance, surface, -wi);
+        let radiance = self.emitted(instance, surface, -wi, time);
         let end = ShadowEnd::Surface { p: surface.p, p_error: surface.p_error, n: surface.ng };
         Some(LightSample { wi, radiance, pdf: pdf as f32, delta: false, end })
     }

@@ -27,7 +27,7 @@ use crate::build::light::{Aim, EmittedPhoton, Lights, PhotonNumbers, PhotonSourc
 use crate::build::nesting::{Meeting, NestedGeometry};
 use crate::description::Rgb;
 use crate::extract::NOTHING;
-use crate::math::{Frame, Ray, offset_ray_origin};
+use crate::math::{Cone, Frame, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::{Inside, NestingFaults, SolidStack};
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
@@ -237,7 +237,7 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
                 power *= materials.transmittance(inside.medium(), hit.t);
             }
             let meeting = self.scene.meet(&ray, hit, &mut inside, &mut counters.nesting);
-            let (hit, surface, beyond, outside) = match meeting {
+            let (hit, mut surface, beyond, outside) = match meeting {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
                 }
@@ -262,10 +262,11 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             if kept && self.storable[material as usize] {
                 leave(&surface, &ray, power, depth, caustic, photons);
             }
+            let at = geometry.texture_point(hit.instance, &surface, ray.time);
             let mut roulette = None;
             if OPACITY {
                 let u = || sampler.one(dimensions + dimension::ROULETTE);
-                let Some(left) = materials.stopped(material, surface.uv, u) else {
+                let Some(left) = materials.stopped(material, &at, u) else {
                     ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
                     continue;
                 };
@@ -277,7 +278,13 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
                 return;
             }
             let mut lobe = sampler.one(dimensions + dimension::LOBE);
-            let bsdf = materials.bsdf_within(material, surface.uv, &mut lobe, outside);
+            let chosen = materials.choose(material, &at, &mut lobe);
+            let bsdf = materials.chosen_bsdf_within(chosen.material, &at, outside);
+            if let Some(relief) = chosen.relief {
+                // What a photon stands for is not known.
+                let (turn, cone) = ((materials, relief), Cone::default());
+                geometry.turn_normal(turn, cone, &ray, &hit, &mut surface, &at);
+            }
             let storable = bsdf.is_storable(self.min_alpha);
             if self.keep == Keep::Caustics && matches!(bsdf, Bsdf::Diffuse(_)) {
                 return;

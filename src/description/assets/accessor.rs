@@ -39,6 +39,16 @@ impl Source<'_> {
         )
     }
 
+    /// Colours of vertices; their coverage is left out.
+    pub fn colors(&self, index: usize) -> Result<Vec<[f32; 3]>, String> {
+        let accessor = self.root.accessors.get(index).ok_or_else(|| missing("accessor", index))?;
+        if matches!(accessor.type_, Checked::Valid(Type::Vec4)) {
+            let with_coverage = self.vectors::<4>(index)?;
+            return Ok(with_coverage.into_iter().map(|[r, g, b, _]| [r, g, b]).collect());
+        }
+        self.vectors::<3>(index)
+    }
+
     /// Indices of vertices.
     pub fn indices(&self, index: usize) -> Result<Vec<u32>, String> {
         let accessor = self.accessor(index, Type::Scalar)?;

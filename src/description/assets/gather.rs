@@ -2,7 +2,7 @@
 
 use super::MAX_MESH_ELEMENTS;
 use super::accessor::Source;
-use crate::description::TriangleMesh;
+use crate::description::{Rgb, TriangleMesh};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use gltf::json::Index;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
@@ -14,6 +14,7 @@ pub(super) struct Gathered {
     mesh: TriangleMesh,
     any_uv: bool,
     any_normal: bool,
+    any_color: bool,
 }
 
 impl Gathered {
@@ -37,6 +38,10 @@ impl Gathered {
         let normals = optional::<3>(source, attribute(Semantic::Normals), count, "normals")?;
         let uvs =
             optional::<2>(source, attribute(Semantic::TexCoords(0)), count, "texture coordinates")?;
+        let colors = match attribute(Semantic::Colors(0)) {
+            Some(colors) => Some(source.colors(colors)?).filter(|colors| colors.len() == count),
+            None => None,
+        };
         let indices = match primitive.indices {
             Some(indices) => source.indices(indices.value())?,
             None => (0..count as u32).collect(),
@@ -54,6 +59,7 @@ impl Gathered {
         }
         self.any_uv |= uvs.is_some();
         self.any_normal |= normals.is_some();
+        self.any_color |= colors.is_some();
         let place =
             |p: &[f32; 3]| transform.transform_point3(DVec3::from(p.map(f64::from))).as_vec3();
         self.mesh.positions.extend(positions.iter().map(place));
@@ -63,6 +69,7 @@ impl Gathered {
         extend(&mut self.mesh.normals, normals, count, orient, Vec3::ZERO);
         // glTF counts v downwards.
         extend(&mut self.mesh.uvs, uvs, count, |[u, v]| Vec2::new(u, 1.0 - v), Vec2::ZERO);
+        extend(&mut self.mesh.colors, colors, count, Rgb::from_array, Rgb::ONE);
         let mirrored = transform.matrix3.determinant() < 0.0;
         let offset = first as u32;
         self.mesh.triangles.extend(assemble(&indices, mode).map(|[a, b, c]| {
@@ -79,6 +86,9 @@ impl Gathered {
         }
         if !self.any_normal {
             self.mesh.normals = Vec::new();
+        }
+        if !self.any_color {
+            self.mesh.colors = Vec::new();
         }
         self.mesh
     }

@@ -44,8 +44,11 @@ fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), AssetError> {
         let found = format!("{vertices} vertices, {} triangles", mesh.triangles.len());
         return Err(too_large(path, found, MAX_MESH_ELEMENTS));
     }
-    for (name, length) in [("normals", mesh.normals.len()), ("texture coordinates", mesh.uvs.len())]
-    {
+    for (name, length) in [
+        ("normals", mesh.normals.len()),
+        ("texture coordinates", mesh.uvs.len()),
+        ("colours", mesh.colors.len()),
+    ] {
         if length != 0 && length != vertices {
             return Err(malformed(path, format!("has {length} {name} for {vertices} positions")));
         }
@@ -56,6 +59,10 @@ fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), AssetError> {
     }
     if let Some(i) = mesh.uvs.iter().position(|uv| !uv.is_finite()) {
         let message = format!("texture coordinate {i} is {}, which is not finite", mesh.uvs[i]);
+        return Err(malformed(path, message));
+    }
+    if let Some(i) = mesh.colors.iter().position(|color| !color.is_finite()) {
+        let message = format!("colour {i} is {}, which is not finite", mesh.colors[i]);
         return Err(malformed(path, message));
     }
     let out_of_range = |t: &&[u32; 3]| t.iter().any(|&i| i as usize >= vertices);
@@ -93,6 +100,9 @@ fn repair_normals(mesh: &mut TriangleMesh) {
                 if !mesh.uvs.is_empty() {
                     mesh.uvs.push(mesh.uvs[vertex]);
                 }
+                if !mesh.colors.is_empty() {
+                    mesh.colors.push(mesh.colors[vertex]);
+                }
             }
         }
     }
@@ -122,6 +132,7 @@ fn drop_unused(mesh: &mut TriangleMesh) {
     keep(&mut mesh.positions, &used);
     keep(&mut mesh.normals, &used);
     keep(&mut mesh.uvs, &used);
+    keep(&mut mesh.colors, &used);
 }
 
 fn keep<T>(values: &mut Vec<T>, used: &[bool]) {

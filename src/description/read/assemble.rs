@@ -12,8 +12,8 @@ use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::{
-    Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription, Texture,
-    TriangleMesh, Waves,
+    Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription,
+    SceneTexture, Texture, TriangleMesh, Waves,
 };
 use indexmap::IndexMap;
 use indexmap::map::Entry;
@@ -71,13 +71,12 @@ pub(super) fn assemble(
             scene.entities.insert(name.clone(), entity);
         }
     }
-    relations::check_cycles(&scene, names, report);
     if complete {
         relations::choose_camera(&mut scene, definitions.camera.as_ref(), names, options, report);
     }
     let mut assets = Assets { options, hash, images: HashMap::new(), meshes: HashMap::new() };
     for (name, cursor) in &names.textures {
-        let texture = surface::read_texture(cursor, report);
+        let texture = surface::read_texture(cursor, names, report);
         if let Some(texture) = texture.and_then(|t| assets.texture(cursor, t, &mut scene, report)) {
             scene.textures.insert(name.clone(), texture);
         }
@@ -87,7 +86,9 @@ pub(super) fn assemble(
             scene.meshes.insert(name.clone(), mesh);
         }
     }
+    relations::check_cycles(&scene, names, report);
     relations::check_shares(&scene, names, report);
+    relations::check_normal_maps(&scene, names, report);
     scene.content_hash = assets.hash.0.digest128();
     scene.warnings = relations::warnings(&scene, names);
     if report.found.has_errors() {
@@ -380,10 +381,10 @@ impl Assets<'_> {
     fn texture(
         &mut self,
         cursor: &Cursor,
-        texture: Texture<String>,
+        texture: Texture<String, String>,
         scene: &mut SceneDescription,
         report: &mut Report,
-    ) -> Option<Texture<Arc<ImageData>>> {
+    ) -> Option<SceneTexture> {
         let place = cursor.at("file");
         let image = |name: String, encoding: Encoding| {
             let path = self.find(&place, &name, scene, report).ok_or(())?;
@@ -397,7 +398,7 @@ impl Assets<'_> {
             })?;
             Ok(self.images.entry(key).or_insert(Arc::new(image)).clone())
         };
-        texture.map_image(image).ok()
+        texture.map_refs(image, &mut Ok).ok()
     }
 
     fn mesh(
@@ -407,9 +408,11 @@ impl Assets<'_> {
         report: &mut Report,
     ) -> Option<Arc<TriangleMesh>> {
         match decode(cursor, report)? {
-            MeshFile::Triangles { positions, triangles, normals, uvs } => {
-                surface::check_triangles(cursor, positions, &triangles, normals, uvs, report)
-                    .map(Arc::new)
+            MeshFile::Triangles { positions, triangles, normals, uvs, colors } => {
+                surface::check_triangles(
+                    cursor, positions, &triangles, normals, uvs, colors, report,
+                )
+                .map(Arc::new)
             }
             MeshFile::Waves { size, cells, waves, steepness, gravity } => {
                 let waves = Waves { size, cells, steepness, gravity, waves };
@@ -440,6 +443,7 @@ impl Assets<'_> {
         self.hash.add("positions", bytemuck::cast_slice(&mesh.positions));
         self.hash.add("normals", bytemuck::cast_slice(&mesh.normals));
         self.hash.add("uvs", bytemuck::cast_slice(&mesh.uvs));
+        self.hash.add("colors", bytemuck::cast_slice(&mesh.colors));
         self.hash.add("triangles", bytemuck::cast_slice(&mesh.triangles));
     }
 }

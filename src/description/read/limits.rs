@@ -129,6 +129,14 @@ pub(super) const GRAVITY: Limits = Limits {
 pub(super) const CELLS: Limits = closed(1.0, 65_536.0, "cells");
 /// Edge of a checker's field.
 pub(super) const UV_LENGTH: Limits = closed(1e-9, 1e15, "in units of uv");
+/// Lengths in uv which may be zero.
+pub(super) const UV_LENGTH_OR_ZERO: Limits = closed(0.0, 1e15, "in units of uv");
+/// Octaves of noise: from 1 m down to an atom.
+pub(super) const OCTAVES: Limits = closed(1.0, 32.0, "octaves");
+/// How far noise bends a pattern, in units of its size.
+pub(super) const DISTORTION: Limits = closed(0.0, 1e6, "");
+/// Powers that sharpen a value.
+pub(super) const POWER: Limits = closed(1e-3, 1e3, "");
 /// Texture coordinates.
 pub(super) const UV: Limits = closed(-1e9, 1e9, "");
 

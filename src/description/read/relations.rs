@@ -6,12 +6,13 @@ use super::surface::reference;
 use super::{LoadOptions, Names};
 use crate::description::diagnostic::{Diagnostic, Diagnostics, Severity, suggestion};
 use crate::description::{
-    EmissionStrength, Light, Material, SceneDescription, Shape, Texture, Value,
+    EmissionStrength, Encoding, ImagePixels, Light, Material, Rgb, SceneDescription, SceneTexture,
+    Shape, Texture, Value,
 };
 use indexmap::IndexMap;
 use std::collections::HashSet;
 
-/// Reports entities which are their own ancestors, and materials made of themselves.
+/// Reports entities which are their own ancestors, and materials and textures made of themselves.
 pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
     let parents: IndexMap<&str, Vec<(&str, &str)>> = scene
         .entities
@@ -33,7 +34,9 @@ pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut
         .map(|(name, material)| {
             let parts = match material {
                 Material::Mix { a, b, .. } => vec![("a", a.as_str()), ("b", b.as_str())],
-                Material::Masked { material, .. } => vec![("material", material.as_str())],
+                Material::Masked { material, .. }
+                | Material::Bump { material, .. }
+                | Material::NormalMap { material, .. } => vec![("material", material.as_str())],
                 _ => Vec::new(),
             };
             (name.as_str(), parts)
@@ -42,6 +45,18 @@ pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut
     for (name, field, path) in cycles(&parts) {
         let message = format!("the material `{name}` is made of itself: {path}");
         report.at("scene::cycle", &names.materials[name].at(field), message);
+    }
+    let parts: IndexMap<&str, Vec<(&str, &str)>> = scene
+        .textures
+        .iter()
+        .map(|(name, texture)| {
+            let parts = texture.refs().map(|(field, part)| (field, part.as_str()));
+            (name.as_str(), parts.collect())
+        })
+        .collect();
+    for (name, field, path) in cycles(&parts) {
+        let message = format!("the texture `{name}` is made of itself: {path}");
+        report.at("scene::cycle", &names.textures[name].at(field), message);
     }
 }
 
@@ -167,12 +182,58 @@ pub(super) fn check_shares(scene: &SceneDescription, names: &Names, report: &mut
             _ => continue,
         };
         let (field, Value::Texture(texture)) = colors else { continue };
-        let Some(Texture::Checker { a, b, .. }) = scene.textures.get(texture) else { continue };
-        if a.max_element() > 1.0 || b.max_element() > 1.0 {
+        if scene.textures.get(texture).is_some_and(|t| greatest(t, scene, 0) > 1.0) {
             let message =
                 format!("`{field}` must be at most 1, but the texture `{texture}` goes beyond");
             report.at("scene::out-of-range", &names.materials[name].at(field), message);
         }
+    }
+}
+
+/// Reports normal maps which are decoded as colours: all their normals would be wrong.
+pub(super) fn check_normal_maps(scene: &SceneDescription, names: &Names, report: &mut Report) {
+    for (name, material) in &scene.materials {
+        let Material::NormalMap { map, .. } = material else { continue };
+        let Some(Texture::Image { file, encoding: Encoding::Srgb, .. }) = scene.textures.get(map)
+        else {
+            continue;
+        };
+        if matches!(file.pixels, ImagePixels::Rgba8(..)) {
+            let message = format!("the texture `{map}` is read as colours, but holds normals");
+            let place = names.materials[name].at("map");
+            report.at("scene::conflict", &place, message).help =
+                Some(format!("add `encoding: Linear` to the texture `{map}`"));
+        }
+    }
+}
+
+/// The greatest value of a texture made of patterns; 0 where it is not known before looking at pixels.
+fn greatest(texture: &SceneTexture, scene: &SceneDescription, depth: usize) -> f32 {
+    // Cycles are reported elsewhere.
+    if depth > scene.textures.len() {
+        return 0.0;
+    }
+    let of = |name: &String| {
+        scene.textures.get(name).map_or(0.0, |texture| greatest(texture, scene, depth + 1))
+    };
+    let value = |value: &Value<Rgb, String>| match value {
+        Value::Constant(color) => color.max_element(),
+        Value::Texture(name) => of(name),
+    };
+    match texture {
+        Texture::Image { .. } | Texture::VertexColor {} => 0.0,
+        Texture::Checker { a, b, .. }
+        | Texture::Stripes { a, b, .. }
+        | Texture::Gradient { a, b }
+        | Texture::Noise { a, b, .. }
+        | Texture::Cells { a, b, .. }
+        | Texture::Marble { a, b, .. }
+        | Texture::Wood { a, b, .. }
+        | Texture::Mix { a, b, .. } => value(a).max(value(b)),
+        Texture::Bricks { a, b, between, .. } => value(a).max(value(b)).max(value(between)),
+        Texture::Multiply { a, b } => value(a) * value(b),
+        Texture::Remap { to, .. } => to.0.max(to.1),
+        Texture::Placed { of: name, .. } | Texture::Triplanar { of: name, .. } => of(name),
     }
 }
 
@@ -194,7 +255,7 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
         });
         used.extend(emitted.into_iter().chain(shining).map(|name| ("texture", name.clone())));
     }
-    // What a used material refers to is used; following the parts ends, for there are no cycles.
+    // What a used material refers to is used; following the parts ends, for each is opened once.
     let mut open: Vec<String> = scene.materials.keys().cloned().collect();
     open.retain(|name| used.contains(&("material", name.clone())));
     while let Some(name) = open.pop() {
@@ -216,6 +277,16 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
         for part in parts {
             if used.insert(("material", part.clone())) {
                 open.push(part);
+            }
+        }
+    }
+    let mut open: Vec<String> = scene.textures.keys().cloned().collect();
+    open.retain(|name| used.contains(&("texture", name.clone())));
+    while let Some(name) = open.pop() {
+        let Some(texture) = scene.textures.get(&name) else { continue };
+        for (_, part) in texture.refs() {
+            if used.insert(("texture", part.clone())) {
+                open.push(part.clone());
             }
         }
     }

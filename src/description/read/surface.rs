@@ -26,6 +26,8 @@ pub(super) enum MeshFile {
         normals: Vec<Vec3>,
         #[serde(default)]
         uvs: Vec<Vec2>,
+        #[serde(default)]
+        colors: Vec<Rgb>,
     },
     /// The moving surface of water.
     Waves {
@@ -97,6 +99,17 @@ impl Parameters<'_, '_> {
 
     fn number(&mut self, field: &str, value: impl Into<f64>, limits: &Limits) {
         limits::number(self.report, &self.cursor.at(field), value, limits);
+    }
+
+    fn colors<const N: usize>(&mut self, values: [(&str, &Value<Rgb, String>); N]) {
+        for (field, value) in values {
+            self.color(field, value, &limits::STRENGTH);
+        }
+    }
+
+    fn uv(&mut self, field: &str, value: Vec2) {
+        let uv = value.to_array().map(f64::from);
+        limits::vector(self.report, &self.cursor.at(field), &uv, &limits::UV);
     }
 
     fn rgb(&mut self, field: &str, value: Rgb, limits: &Limits) {
@@ -177,25 +190,106 @@ pub(super) fn read_material(
             check.material("material", material);
             check.scalar("opacity", opacity);
         }
+        Material::Bump { material, height, strength } => {
+            check.material("material", material);
+            check.texture(&cursor.at("height"), height);
+            check.number("strength", *strength, &limits::COORDINATE);
+        }
+        Material::NormalMap { material, map, strength, green: _ } => {
+            check.material("material", material);
+            check.texture(&cursor.at("map"), map);
+            check.number("strength", *strength, &limits::STRENGTH);
+        }
     }
     Some(material)
 }
 
-/// Reads a texture and checks its numbers; its file is only named.
-pub(super) fn read_texture(cursor: &Cursor, report: &mut Report) -> Option<Texture<String>> {
-    let texture: Texture<String> = decode(cursor, report)?;
+/// Reads a texture and checks its numbers and names; its file is only named.
+pub(super) fn read_texture(
+    cursor: &Cursor,
+    names: &Names,
+    report: &mut Report,
+) -> Option<Texture<String, String>> {
+    let texture: Texture<String, String> = decode(cursor, report)?;
+    let mut check = Parameters { cursor, names, report };
     match &texture {
         Texture::Image { repeat, offset, .. } => {
-            for (field, uv) in [("repeat", repeat), ("offset", offset)] {
-                let uv = uv.to_array().map(f64::from);
-                limits::vector(report, &cursor.at(field), &uv, &limits::UV);
-            }
+            check.uv("repeat", *repeat);
+            check.uv("offset", *offset);
         }
         Texture::Checker { size, a, b } => {
-            limits::number(report, &cursor.at("size"), *size, &limits::UV_LENGTH);
-            limits::color(report, &cursor.at("a"), *a, &limits::STRENGTH);
-            limits::color(report, &cursor.at("b"), *b, &limits::STRENGTH);
+            check.number("size", *size, &limits::UV_LENGTH);
+            check.colors([("a", a), ("b", b)]);
         }
+        Texture::Stripes { size, share, a, b } => {
+            check.number("size", *size, &limits::UV_LENGTH);
+            check.number("share", *share, &limits::SHARE);
+            check.colors([("a", a), ("b", b)]);
+        }
+        Texture::Gradient { a, b } | Texture::Multiply { a, b } => {
+            check.colors([("a", a), ("b", b)]);
+        }
+        Texture::Bricks { size, mortar, bevel, shift, seed: _, a, b, between } => {
+            for (axis, length) in size.to_array().into_iter().enumerate() {
+                let place = cursor.at("size").nth(axis);
+                limits::number(check.report, &place, length, &limits::UV_LENGTH);
+            }
+            check.number("mortar", *mortar, &limits::UV_LENGTH_OR_ZERO);
+            check.number("bevel", *bevel, &limits::UV_LENGTH_OR_ZERO);
+            check.number("shift", *shift, &limits::SHARE);
+            check.colors([("a", a), ("b", b), ("between", between)]);
+        }
+        Texture::Noise { size, octaves, gain, turbulence: _, seed: _, a, b } => {
+            check.number("size", *size, &limits::LENGTH);
+            check.number("octaves", *octaves, &limits::OCTAVES);
+            check.number("gain", *gain, &limits::SHARE);
+            check.colors([("a", a), ("b", b)]);
+        }
+        Texture::Cells { size, shows: _, jitter, seed: _, a, b } => {
+            check.number("size", *size, &limits::LENGTH);
+            check.number("jitter", *jitter, &limits::SHARE);
+            check.colors([("a", a), ("b", b)]);
+        }
+        Texture::Marble { size, distortion, sharpness, seed: _, a, b } => {
+            check.number("size", *size, &limits::LENGTH);
+            check.number("distortion", *distortion, &limits::DISTORTION);
+            check.number("sharpness", *sharpness, &limits::POWER);
+            check.colors([("a", a), ("b", b)]);
+        }
+        Texture::Wood { size, distortion, grain, seed: _, a, b } => {
+            check.number("size", *size, &limits::LENGTH);
+            check.number("distortion", *distortion, &limits::DISTORTION);
+            check.number("grain", *grain, &limits::SHARE);
+            check.colors([("a", a), ("b", b)]);
+        }
+        Texture::Mix { a, b, amount } => {
+            check.colors([("a", a), ("b", b)]);
+            check.scalar("amount", amount);
+        }
+        Texture::Remap { of, from, to, smooth: _ } => {
+            check.texture(&cursor.at("of"), of);
+            for (field, (low, high)) in [("from", from), ("to", to)] {
+                let ends = [*low, *high].map(f64::from);
+                limits::vector(check.report, &cursor.at(field), &ends, &limits::UV);
+            }
+            if from.0 == from.1 {
+                let message =
+                    format!("`from` must be two different numbers, but both are {}", from.0);
+                check.report.at("scene::empty-range", &cursor.at("from"), message);
+            }
+        }
+        Texture::Placed { of, repeat, rotation, offset } => {
+            check.texture(&cursor.at("of"), of);
+            check.uv("repeat", *repeat);
+            check.number("rotation", *rotation, &limits::ANGLE);
+            check.uv("offset", *offset);
+        }
+        Texture::Triplanar { of, size, sharpness } => {
+            check.texture(&cursor.at("of"), of);
+            check.number("size", *size, &limits::LENGTH);
+            check.number("sharpness", *sharpness, &limits::POWER);
+        }
+        Texture::VertexColor {} => {}
     }
     Some(texture)
 }
@@ -207,6 +301,7 @@ pub(super) fn check_triangles(
     triangles: &[(u32, u32, u32)],
     normals: Vec<Vec3>,
     uvs: Vec<Vec2>,
+    colors: Vec<Rgb>,
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let mut fine = true;
@@ -232,7 +327,12 @@ pub(super) fn check_triangles(
             fine = false;
         }
     }
-    for (field, length) in [("normals", normals.len()), ("uvs", uvs.len())] {
+    let place = cursor.at("colors");
+    for (index, color) in colors.iter().enumerate() {
+        fine &= limits::color(report, &place.nth(index), *color, &limits::STRENGTH);
+    }
+    let lists = [("normals", normals.len()), ("uvs", uvs.len()), ("colors", colors.len())];
+    for (field, length) in lists {
         if length != 0 && length != positions.len() {
             let message =
                 format!("`{field}` has {length} entries for {} positions", positions.len());
@@ -254,7 +354,7 @@ pub(super) fn check_triangles(
         }
     }
     let triangles = triangles.iter().map(|&(a, b, c)| [a, b, c]).collect();
-    fine.then_some(TriangleMesh { positions, normals: unit, uvs, triangles })
+    fine.then_some(TriangleMesh { positions, normals: unit, uvs, colors, triangles })
 }
 
 /// Reads a shape and checks it.

@@ -5,7 +5,10 @@
 //! reduced in `f64`: at uv = 10⁷ an `f32` product with the resolution would have lost the texel.
 
 use super::luminance;
-use crate::description::{Channel, Encoding, ImageData, ImagePixels, Rgb, TextureFilter, Wrap};
+use super::pyramid::Pyramid;
+use crate::description::{
+    Channel, Encoding, ImageData, ImagePixels, Rgb, TextureFilter, TextureFiltering, Wrap,
+};
 use glam::{DVec2, DVec3, Vec2, Vec4};
 use std::sync::LazyLock;
 
@@ -22,10 +25,70 @@ static SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     })
 });
 
-/// The uv of the image: `uv · repeat + offset`.
-#[inline]
-pub(super) fn place(uv: Vec2, repeat: Vec2, offset: Vec2) -> DVec2 {
-    uv.as_dvec2() * repeat.as_dvec2() + offset.as_dvec2()
+/// How an image is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Look {
+    pub(super) wrap: Wrap,
+    pub(super) filter: TextureFilter,
+    pub(super) filtering: TextureFiltering,
+}
+
+/// Most probes along the longer axis of a footprint; one that is longer still is looked at with wider probes.
+const MOST_PROBES: f32 = 16.0;
+
+impl Look {
+    /// The mean over an ellipse with these axes (from end to end, in uv) around `uv`.
+    ///
+    /// Isotropic: between the two levels of the pyramid whose texels are about as wide as the longer axis
+    /// (Williams 1983, "Pyramidal Parametrics"). Anisotropic: by levels for the shorter axis, in several
+    /// probes along the longer one (`McCormack`, Perry, Farkas, Jouppi 1999, "Feline: Fast Elliptical Lines for
+    /// Anisotropic Texture Mapping", SIGGRAPH 99).
+    pub(super) fn filtered(self, pyramid: &Pyramid, uv: DVec2, axes: [Vec2; 2]) -> Vec4 {
+        let image = &*pyramid.base;
+        let unfiltered = self.filter == TextureFilter::Nearest
+            || self.filtering == TextureFiltering::Point
+            || axes == [Vec2::ZERO; 2];
+        if unfiltered {
+            return lookup(image, self.wrap, self.filter, uv);
+        }
+        let size = Vec2::new(image.width as f32, image.height as f32);
+        let [a, b] = axes.map(|axis| (axis * size).length());
+        let (longer, axis) = if a >= b { (a, axes[0]) } else { (b, axes[1]) };
+        let shorter = a.min(b);
+        // Footprints that no number describes see the mean of the image.
+        if !longer.is_finite() {
+            return self.level(pyramid, f32::INFINITY, uv);
+        }
+        match self.filtering {
+            TextureFiltering::Anisotropic if longer > 1.0 => {
+                let width = shorter.max(longer / MOST_PROBES).max(1.0);
+                let probes = (longer / width).ceil().max(1.0);
+                let mut sum = Vec4::ZERO;
+                for k in 0..probes as u32 {
+                    let along = f64::from((k as f32 + 0.5) / probes - 0.5);
+                    sum += self.level(pyramid, width.log2(), uv + axis.as_dvec2() * along);
+                }
+                sum / probes
+            }
+            _ => self.level(pyramid, longer.log2(), uv),
+        }
+    }
+
+    /// Between two levels of a pyramid.
+    fn level(self, pyramid: &Pyramid, level: f32, uv: DVec2) -> Vec4 {
+        let last = pyramid.len() - 1;
+        let at = |level: usize| lookup(pyramid.level(level), self.wrap, self.filter, uv);
+        if level <= 0.0 {
+            return at(0);
+        }
+        if level >= last as f32 {
+            return at(last);
+        }
+        let below = level.floor();
+        let share = level - below;
+        let fine = at(below as usize);
+        if share == 0.0 { fine } else { fine + (at(below as usize + 1) - fine) * share }
+    }
 }
 
 /// Linear colour and coverage at `uv`. An axis whose coordinate is not finite reads texel 0.
@@ -109,7 +172,7 @@ fn tap(i: i64, wrap: Wrap, size: u32) -> u32 {
 }
 
 #[inline]
-fn texel(image: &ImageData, column: u32, row: u32) -> Vec4 {
+pub(super) fn texel(image: &ImageData, column: u32, row: u32) -> Vec4 {
     let index = row as usize * image.width as usize + column as usize;
     match &image.pixels {
         ImagePixels::Rgba8(codes, encoding) => {

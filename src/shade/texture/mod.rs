@@ -1,17 +1,28 @@
-//! Textures: values which vary over a surface, as functions of uv.
+//! Textures: values which vary over a surface.
 //!
 //! `u` runs to the right and `v` **up**: `(0, 0)` is the lower left corner of an image and the row at its
-//! top is at `v = 1`. Colours are linear Rec. 709; lookups interpolate linear light.
+//! top is at `v = 1`. Colours are linear Rec. 709; lookups interpolate linear light. What is finer than the footprint
+//! of a sample is replaced by its mean: images by a pyramid, patterns in closed form, noise octave by
+//! octave.
 
-mod checker;
 mod image;
+mod pattern;
+mod point;
+mod pyramid;
+mod solid;
 
-use crate::description::{ImageData, Rgb, Texture};
-use glam::Vec2;
+pub use point::TexturePoint;
+pub use pyramid::Pyramid;
+
+use crate::description::{ImageData, Rgb, Texture, TextureFiltering, Value};
+use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
+use pattern::Wall;
+use solid::Octaves;
+use std::collections::HashMap;
 use std::sync::Arc;
 
-/// A texture as a frame uses it, its pixels shared.
-pub type RenderTexture = Texture<Arc<ImageData>>;
+/// A texture as a frame uses it: its pixels shared, other textures by index.
+pub type RenderTexture = Texture<Arc<Pyramid>, u32>;
 
 /// Rec. 709 luminance of a linear colour (Rec. ITU-R BT.709-6, item 3.2, rounded weights).
 #[inline]
@@ -19,33 +30,334 @@ pub(crate) fn luminance(color: Rgb) -> f32 {
     color.dot(Rgb::new(0.2126, 0.7152, 0.0722))
 }
 
-/// The colour of a texture at `uv`.
-#[inline]
-pub fn color(texture: &RenderTexture, uv: Vec2) -> Rgb {
-    match texture {
-        Texture::Image { file, wrap, filter, repeat, offset, .. } => {
-            image::lookup(file, *wrap, *filter, image::place(uv, *repeat, *offset)).truncate()
-        }
-        Texture::Checker { size, a, b } => checker::color(uv, *size, *a, *b),
+/// What a texture is asked for: a colour, or a number.
+trait Sample:
+    Copy
+    + std::ops::Add<Output = Self>
+    + std::ops::Mul<Output = Self>
+    + std::ops::Mul<f32, Output = Self>
+{
+    fn of_color(color: Rgb) -> Self;
+    fn of_texel(texel: Vec4, channel: crate::description::Channel) -> Self;
+    fn each(self, f: impl Fn(f32) -> f32) -> Self;
+}
+
+impl Sample for Rgb {
+    fn of_color(color: Rgb) -> Self {
+        color
+    }
+
+    fn of_texel(texel: Vec4, _: crate::description::Channel) -> Self {
+        texel.truncate()
+    }
+
+    fn each(self, f: impl Fn(f32) -> f32) -> Self {
+        self.map(f)
     }
 }
 
-/// The number which a texture holds at `uv`: the chosen channel of an image, the luminance of a pattern.
-#[inline]
-pub fn scalar(texture: &RenderTexture, uv: Vec2) -> f32 {
-    match texture {
-        Texture::Image { file, wrap, filter, repeat, offset, channel, .. } => {
-            let texel = image::lookup(file, *wrap, *filter, image::place(uv, *repeat, *offset));
-            image::channel(texel, *channel)
-        }
-        Texture::Checker { size, a, b } => luminance(checker::color(uv, *size, *a, *b)),
+impl Sample for f32 {
+    fn of_color(color: Rgb) -> Self {
+        luminance(color)
+    }
+
+    fn of_texel(texel: Vec4, channel: crate::description::Channel) -> Self {
+        image::channel(texel, channel)
+    }
+
+    fn each(self, f: impl Fn(f32) -> f32) -> Self {
+        f(self)
     }
 }
 
-/// Mean colour of a texture over its period: for the power of a textured light.
-pub fn average(texture: &RenderTexture) -> Rgb {
-    match texture {
-        Texture::Image { file, .. } => image::average(file),
-        Texture::Checker { a, b, .. } => 0.5 * (*a + *b),
+/// What a texture needs to know of a point beside uv.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TextureNeeds {
+    /// Place, normal or colour.
+    pub place: bool,
+    /// How much of the surface a sample stands for.
+    pub footprint: bool,
+}
+
+impl TextureNeeds {
+    /// What either needs.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self { place: self.place || other.place, footprint: self.footprint || other.footprint }
+    }
+}
+
+/// All textures of a frame.
+#[derive(Clone, Debug, Default)]
+pub struct Textures {
+    list: Vec<RenderTexture>,
+    filtering: TextureFiltering,
+}
+
+impl Textures {
+    /// The textures of a frame; their references are indices into the list. Pyramids are made unless
+    /// `filtering` needs none; those in `known` are used again.
+    ///
+    /// # Panics
+    /// If a reference is out of range.
+    pub fn new(
+        list: Vec<Texture<Arc<ImageData>, u32>>,
+        filtering: TextureFiltering,
+        known: &Pyramids,
+    ) -> Self {
+        let count = list.len() as u32;
+        let levels = filtering != TextureFiltering::Point;
+        let mut made = Pyramids::default();
+        let list = list
+            .into_iter()
+            .map(|texture| {
+                let mut image = |image: Arc<ImageData>, _| {
+                    let pyramid = known.find(&image, levels).or_else(|| made.find(&image, levels));
+                    let pyramid = pyramid.unwrap_or_else(|| Arc::new(Pyramid::new(image, levels)));
+                    made.keep(&pyramid);
+                    Ok::<_, std::convert::Infallible>(pyramid)
+                };
+                let mut reference = |index: u32| {
+                    assert!(index < count, "texture {index} of {count}");
+                    Ok(index)
+                };
+                match texture.map_refs(&mut image, &mut reference) {
+                    Ok(texture) => texture,
+                    Err(never) => match never {},
+                }
+            })
+            .collect();
+        Self { list, filtering }
+    }
+
+    /// What is done about fine textures.
+    pub fn filtering(&self) -> TextureFiltering {
+        self.filtering
+    }
+
+    /// The pyramids in use, for the next frame.
+    pub fn pyramids(&self) -> Pyramids {
+        let mut pyramids = Pyramids::default();
+        for texture in &self.list {
+            if let Texture::Image { file, .. } = texture {
+                pyramids.keep(file);
+            }
+        }
+        pyramids
+    }
+
+    /// The textures, in the order given.
+    pub fn list(&self) -> &[RenderTexture] {
+        &self.list
+    }
+
+    /// What a texture, or one that it refers to, needs to know of a point beside uv.
+    pub fn needs(&self, index: u32) -> TextureNeeds {
+        let texture = &self.list[index as usize];
+        let place = matches!(
+            texture,
+            Texture::Noise { .. }
+                | Texture::Cells { .. }
+                | Texture::Marble { .. }
+                | Texture::Wood { .. }
+                | Texture::Triplanar { .. }
+                | Texture::VertexColor {}
+        );
+        let own = TextureNeeds { place, footprint: self.filtering != TextureFiltering::Point };
+        texture.refs().fold(own, |sum, (_, part)| sum.and(self.needs(*part)))
+    }
+
+    /// The colour of a texture at a point.
+    #[inline]
+    pub fn color(&self, index: u32, at: &TexturePoint) -> Rgb {
+        self.sample(index, at)
+    }
+
+    /// The number which a texture holds at a point: the chosen channel of an image, the luminance of a
+    /// pattern.
+    #[inline]
+    pub fn scalar(&self, index: u32, at: &TexturePoint) -> f32 {
+        self.sample(index, at)
+    }
+
+    /// How many places of the unit square a texture tells apart: the most of all images that it is made of.
+    /// Patterns and solid textures count as fine enough for any that a picture can show.
+    pub fn resolution(&self, index: u32) -> (u32, u32) {
+        let texture = &self.list[index as usize];
+        let own = match texture {
+            Texture::Image { file, .. } => (file.base.width, file.base.height),
+            Texture::Mix { .. } | Texture::Multiply { .. } | Texture::Remap { .. } => (1, 1),
+            _ => (1024, 512),
+        };
+        texture.refs().fold(own, |(width, height), (_, part)| {
+            let (w, h) = self.resolution(*part);
+            (width.max(w), height.max(h))
+        })
+    }
+
+    /// How many textures there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Bytes of all images and their pyramids, each counted once.
+    pub fn memory(&self) -> usize {
+        let bytes = |pyramid: &Arc<Pyramid>| pyramid.base.memory() + pyramid.memory();
+        self.pyramids().0.values().map(bytes).sum()
+    }
+
+    /// Mean colour of a texture over the unit square: for the power of a textured light. Exact for images and
+    /// what is filtered in closed form; of a solid texture that of a slice through it.
+    pub fn average(&self, index: u32) -> Rgb {
+        const N: u32 = 32;
+        if let Texture::Image { file, .. } = &self.list[index as usize] {
+            return image::average(&file.base);
+        }
+        let mut sum = Rgb::ZERO;
+        for k in 0..N * N {
+            let uv = Vec2::new((k % N) as f32 + 0.5, (k / N) as f32 + 0.5) / N as f32;
+            let axes = [Vec2::X, Vec2::Y].map(|axis| axis / N as f32);
+            let p = uv.extend(0.0).as_dvec3();
+            sum += self.color(index, &TexturePoint { p, axes, ..TexturePoint::at(uv) });
+        }
+        sum / (N * N) as f32
+    }
+
+    fn value<T: Sample>(&self, value: &Value<Rgb, u32>, at: &TexturePoint) -> T {
+        match *value {
+            Value::Constant(color) => T::of_color(color),
+            Value::Texture(index) => self.sample(index, at),
+        }
+    }
+
+    /// `(1 − share)·a + share·b`; what has no share is not looked up.
+    fn mix<T: Sample>(&self, [a, b]: [&Value<Rgb, u32>; 2], share: f32, at: &TexturePoint) -> T {
+        if share == 0.0 {
+            self.value(a, at)
+        } else if share == 1.0 {
+            self.value(b, at)
+        } else {
+            self.value::<T>(a, at) * (1.0 - share) + self.value::<T>(b, at) * share
+        }
+    }
+
+    fn sample<T: Sample>(&self, index: u32, at: &TexturePoint) -> T {
+        match &self.list[index as usize] {
+            Texture::Image { file, wrap, filter, repeat, offset, channel, .. } => {
+                let look = image::Look { wrap: *wrap, filter: *filter, filtering: self.filtering };
+                // In f64: far coordinates keep their texel.
+                let uv = at.uv.as_dvec2() * repeat.as_dvec2() + offset.as_dvec2();
+                let axes = at.axes.map(|axis| axis * *repeat);
+                T::of_texel(look.filtered(file, uv, axes), *channel)
+            }
+            Texture::Checker { size, a, b } => self.mix([a, b], pattern::checker(at, *size), at),
+            Texture::Stripes { size, share, a, b } => {
+                self.mix([a, b], pattern::stripes(at, *size, *share), at)
+            }
+            Texture::Gradient { a, b } => {
+                let share = if at.uv.x.is_nan() { 0.0 } else { at.uv.x.clamp(0.0, 1.0) };
+                self.mix([a, b], share, at)
+            }
+            Texture::Bricks { size, mortar, bevel, shift, seed, a, b, between } => {
+                let wall = Wall {
+                    size: *size,
+                    mortar: *mortar,
+                    bevel: *bevel,
+                    shift: *shift,
+                    seed: *seed,
+                };
+                let brick = wall.at(at);
+                if brick.solid == 0.0 {
+                    return self.value(between, at);
+                }
+                let face: T = self.mix([a, b], brick.number, at);
+                if brick.solid == 1.0 {
+                    return face;
+                }
+                face * brick.solid + self.value::<T>(between, at) * (1.0 - brick.solid)
+            }
+            Texture::Noise { size, octaves, gain, turbulence, seed, a, b } => {
+                let octaves =
+                    Octaves { count: *octaves, gain: *gain, turbulence: *turbulence, seed: *seed };
+                self.mix([a, b], solid::noise(at, *size, &octaves), at)
+            }
+            Texture::Cells { size, shows, jitter, seed, a, b } => {
+                self.mix([a, b], solid::cells(at, *size, *shows, *jitter, *seed), at)
+            }
+            Texture::Marble { size, distortion, sharpness, seed, a, b } => {
+                self.mix([a, b], solid::marble(at, *size, *distortion, *sharpness, *seed), at)
+            }
+            Texture::Wood { size, distortion, grain, seed, a, b } => {
+                self.mix([a, b], solid::wood(at, *size, *distortion, *grain, *seed), at)
+            }
+            Texture::Mix { a, b, amount } => {
+                let amount = match *amount {
+                    Value::Constant(amount) => amount,
+                    Value::Texture(index) => self.scalar(index, at),
+                };
+                self.mix([a, b], amount.clamp(0.0, 1.0), at)
+            }
+            Texture::Multiply { a, b } => self.value::<T>(a, at) * self.value::<T>(b, at),
+            Texture::Remap { of, from, to, smooth } => {
+                self.sample::<T>(*of, at).each(|value| remap(value, *from, *to, *smooth))
+            }
+            Texture::Placed { of, repeat, rotation, offset } => {
+                let turn = DMat2::from_angle(f64::from(*rotation).to_radians());
+                let m = turn * DMat2::from_diagonal(repeat.as_dvec2());
+                self.sample(*of, &at.placed(m, offset.as_dvec2()))
+            }
+            Texture::Triplanar { of, size, sharpness } => {
+                self.triplanar(*of, *size, *sharpness, at)
+            }
+            Texture::VertexColor {} => T::of_color(at.color),
+        }
+    }
+
+    /// The texture seen along each axis, weighted by how much the surface faces it.
+    fn triplanar<T: Sample>(&self, of: u32, size: f32, sharpness: f32, at: &TexturePoint) -> T {
+        let weights = at.n.abs().map(|n| n.powf(sharpness));
+        let weights = weights / weights.element_sum();
+        let p = at.p / f64::from(size);
+        // From +x z runs to the left, from +y it runs down: the picture is upright and not mirrored.
+        let sides = [DVec2::new(-p.z, p.y), DVec2::new(p.x, -p.z), DVec2::new(p.x, p.y)];
+        let axes = [Vec2::X, Vec2::Y].map(|axis| axis * (at.width / size));
+        let seen = |side: usize| {
+            let at = TexturePoint { uv: sides[side].as_vec2(), axes, ..*at };
+            self.sample::<T>(of, &at) * weights[side]
+        };
+        let mut sum = T::of_color(Vec3::ZERO);
+        for side in 0..3 {
+            if weights[side] > 0.0 {
+                sum = sum + seen(side);
+            }
+        }
+        sum
+    }
+}
+
+/// A value of one range as one of another; beyond the ends it stays there.
+fn remap(value: f32, from: (f32, f32), to: (f32, f32), smooth: bool) -> f32 {
+    let share = ((value - from.0) / (from.1 - from.0)).clamp(0.0, 1.0);
+    let share = if smooth { pattern::smooth(f64::from(share)) } else { share };
+    to.0 + (to.1 - to.0) * share
+}
+
+/// Pyramids that were made, by the address of their image, which each of them keeps alive.
+#[derive(Clone, Debug, Default)]
+pub struct Pyramids(HashMap<usize, Arc<Pyramid>>);
+
+impl Pyramids {
+    fn find(&self, image: &Arc<ImageData>, levels: bool) -> Option<Arc<Pyramid>> {
+        let pyramid = self.0.get(&Arc::as_ptr(image).addr())?;
+        (pyramid.has_levels() == levels).then(|| pyramid.clone())
+    }
+
+    fn keep(&mut self, pyramid: &Arc<Pyramid>) {
+        self.0.insert(Arc::as_ptr(&pyramid.base).addr(), pyramid.clone());
     }
 }

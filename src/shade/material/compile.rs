@@ -1,0 +1,321 @@
+//! Materials, compiled: what does not depend on the point is resolved.
+
+use super::relief::Relief;
+use super::{Compiled, Interior, MaterialTable, material_cycle};
+use crate::description::{Material, Rgb, Value};
+use crate::shade::bsdf::{
+    AlbedoTable, ConductorFresnel, ReflectorTable, RoughDielectric, SMOOTH_BELOW_ALPHA, Widths,
+    coat_table, dielectric_average, glass_table, reflector_table, reflector_table_at,
+};
+use crate::shade::metals;
+use crate::shade::relative::RelativeTables;
+use crate::shade::texture::Textures;
+use std::collections::HashMap;
+
+/// A material with its constants resolved.
+#[derive(Clone, Debug)]
+pub(super) enum Kind {
+    Diffuse {
+        albedo: Value<Rgb, u32>,
+    },
+    Mirror {
+        reflectance: Value<Rgb, u32>,
+    },
+    Dielectric {
+        eta: f32,
+        width: Width,
+        average: f32,
+        table: Option<u32>,
+    },
+    ThinGlass {
+        eta: f32,
+        tint: Value<Rgb, u32>,
+    },
+    Conductor {
+        fresnel: MetalColor,
+        width: Width,
+        table: Option<u32>,
+    },
+    Plastic {
+        albedo: Value<Rgb, u32>,
+        eta: f32,
+        width: Width,
+        average: f32,
+        table: Option<u32>,
+    },
+    Principled {
+        base_color: Value<Rgb, u32>,
+        metallic: Value<f32, u32>,
+        width: Width,
+        table: Option<u32>,
+        ior: f32,
+        transmission: Value<f32, u32>,
+    },
+    Mix {
+        a: u32,
+        b: u32,
+        amount: Value<f32, u32>,
+    },
+    Masked {
+        material: u32,
+        opacity: Value<f32, u32>,
+    },
+    Relief {
+        material: u32,
+    },
+}
+
+/// How a metal reflects.
+#[derive(Clone, Debug)]
+pub(super) enum MetalColor {
+    /// One reflectance everywhere, and its cosine-weighted mean.
+    Same(ConductorFresnel, Rgb),
+    /// Reflectance at normal incidence.
+    F0(Value<Rgb, u32>),
+}
+
+/// Width `α` of the microfacets.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::shade) enum Width {
+    Smooth,
+    Constant(f32),
+    /// The texture holds the roughness.
+    Texture(u32),
+}
+
+impl Width {
+    pub(in crate::shade) fn new(roughness: Value<f32, u32>) -> Self {
+        match roughness {
+            Value::Constant(roughness) => match alpha(roughness) {
+                Some(alpha) => Self::Constant(alpha),
+                None => Self::Smooth,
+            },
+            Value::Texture(texture) => Self::Texture(texture),
+        }
+    }
+
+    /// Bounds of the width over the surface; a texture may ask for any.
+    pub(super) fn narrowest(self) -> f32 {
+        if let Self::Constant(alpha) = self { alpha } else { 0.0 }
+    }
+
+    pub(super) fn widest(self) -> f32 {
+        match self {
+            Self::Smooth => 0.0,
+            Self::Constant(alpha) => alpha,
+            Self::Texture(_) => 1.0,
+        }
+    }
+
+    pub(in crate::shade) fn widths(self) -> Option<Widths> {
+        match self {
+            Self::Smooth => None,
+            Self::Constant(alpha) => Some(Widths::One(alpha)),
+            Self::Texture(_) => Some(Widths::All),
+        }
+    }
+}
+
+/// The GGX width of a perceptual roughness; `None` is smooth.
+#[inline]
+pub(in crate::shade) fn alpha(roughness: f32) -> Option<f32> {
+    let roughness = roughness.clamp(0.0, 1.0);
+    let alpha = roughness * roughness;
+    (alpha >= SMOOTH_BELOW_ALPHA).then_some(alpha)
+}
+
+impl MaterialTable {
+    /// Compiles the materials of a frame; their references are indices into `materials` and `textures`.
+    ///
+    /// # Panics
+    /// If a reference is out of range or [`material_cycle`] finds a cycle.
+    pub fn new(materials: &[Material<u32>], textures: Textures) -> Self {
+        assert_eq!(material_cycle(materials), None, "the description rejects cycles of materials");
+        let mut table = Self {
+            materials: Vec::new(),
+            textures,
+            coats: Vec::new(),
+            glasses: Vec::new(),
+            reflectors: Vec::new(),
+            relative: RelativeTables::new(materials),
+        };
+        let mut known = KnownTables::default();
+        let kinds: Vec<Kind> =
+            materials.iter().map(|material| table.compile(material, &mut known)).collect();
+        table.materials = kinds
+            .iter()
+            .enumerate()
+            .map(|(index, kind)| Compiled {
+                kind: kind.clone(),
+                has_opacity: has_opacity(index as u32, &kinds),
+                needs_lobe: needs_lobe(index as u32, &kinds),
+                interior: interior(index as u32, materials),
+                relief: relief(&materials[index]),
+            })
+            .collect();
+        table
+    }
+
+    fn compile(&mut self, material: &Material<u32>, known: &mut KnownTables) -> Kind {
+        match *material {
+            Material::Diffuse { albedo } => Kind::Diffuse { albedo },
+            Material::Mirror { reflectance } => Kind::Mirror { reflectance },
+            Material::Dielectric { ior, roughness, .. } => {
+                let width = glass_width(ior, Width::new(roughness));
+                let table = known.glass(&mut self.glasses, ior, width);
+                Kind::Dielectric { eta: ior, width, average: dielectric_average(ior), table }
+            }
+            Material::ThinGlass { ior, tint } => Kind::ThinGlass { eta: ior, tint },
+            Material::Conductor { metal, f0, eta, k, roughness } => {
+                let width = Width::new(roughness);
+                let table = known.reflector(&mut self.reflectors, width);
+                Kind::Conductor { fresnel: metal_color(metal, f0, eta, k), width, table }
+            }
+            Material::Plastic { albedo, ior, roughness } => {
+                let width = Width::new(roughness);
+                let table = known.coat(&mut self.coats, ior, width);
+                Kind::Plastic { albedo, eta: ior, width, average: dielectric_average(ior), table }
+            }
+            Material::Principled { base_color, metallic, roughness, ior, transmission } => {
+                let width = Width::new(roughness);
+                let table = known.reflector(&mut self.reflectors, width);
+                Kind::Principled { base_color, metallic, width, table, ior, transmission }
+            }
+            Material::Mix { a, b, amount } => Kind::Mix { a, b, amount },
+            Material::Masked { material, opacity } => Kind::Masked { material, opacity },
+            Material::Bump { material, .. } | Material::NormalMap { material, .. } => {
+                Kind::Relief { material }
+            }
+        }
+    }
+}
+
+/// The width of a rough dielectric, or smooth where its transmitted lobe could not be resolved.
+pub(in crate::shade) fn glass_width(eta: f32, width: Width) -> Width {
+    let strength = (eta - 1.0).abs();
+    let resolved = match width {
+        Width::Smooth => false,
+        Width::Constant(alpha) => strength * alpha >= RoughDielectric::SMOOTH_BELOW_WIDTH,
+        // At the smallest width the texture can ask for.
+        Width::Texture(_) => strength * SMOOTH_BELOW_ALPHA >= RoughDielectric::SMOOTH_BELOW_WIDTH,
+    };
+    if resolved { width } else { Width::Smooth }
+}
+
+fn metal_color(
+    metal: Option<crate::description::Metal>,
+    f0: Option<Value<Rgb, u32>>,
+    eta: Option<Rgb>,
+    k: Option<Rgb>,
+) -> MetalColor {
+    let same = |eta, k| {
+        let fresnel = ConductorFresnel::Complex { eta, k };
+        MetalColor::Same(fresnel, fresnel.average())
+    };
+    match (metal, f0, eta.zip(k)) {
+        (Some(metal), ..) => {
+            let (eta, k) = metals::index_of_refraction(metal);
+            same(eta, k)
+        }
+        (None, Some(Value::Constant(f0)), _) => {
+            let fresnel = ConductorFresnel::Schlick { f0 };
+            MetalColor::Same(fresnel, fresnel.average())
+        }
+        (None, Some(f0), _) => MetalColor::F0(f0),
+        (None, None, Some((eta, k))) => same(eta, k),
+        // The description demands one of the three; a world built by hand may lack all of them.
+        (None, None, None) => MetalColor::F0(Value::Constant(Rgb::ONE)),
+    }
+}
+
+fn has_opacity(index: u32, kinds: &[Kind]) -> bool {
+    match &kinds[index as usize] {
+        Kind::Masked { .. } => true,
+        Kind::Mix { a, b, .. } => has_opacity(*a, kinds) || has_opacity(*b, kinds),
+        Kind::Relief { material } => has_opacity(*material, kinds),
+        _ => false,
+    }
+}
+
+fn needs_lobe(index: u32, kinds: &[Kind]) -> bool {
+    match &kinds[index as usize] {
+        Kind::Diffuse { .. } | Kind::Mirror { .. } => false,
+        Kind::Masked { material, .. } | Kind::Relief { material } => needs_lobe(*material, kinds),
+        _ => true,
+    }
+}
+
+fn relief(material: &Material<u32>) -> Option<Relief> {
+    match *material {
+        Material::Bump { height, strength, .. } => Some(Relief::Bump { height, strength }),
+        Material::NormalMap { map, strength, green, .. } => {
+            Some(Relief::Normals { map, strength, green })
+        }
+        _ => None,
+    }
+}
+
+fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
+    match &materials[index as usize] {
+        Material::Dielectric { ior, attenuation, priority, .. } => Some(Interior {
+            ior: *ior,
+            sigma_a: attenuation.map(|attenuation| attenuation.sigma_a()),
+            priority: *priority,
+        }),
+        Material::Masked { material, .. }
+        | Material::Bump { material, .. }
+        | Material::NormalMap { material, .. } => interior(*material, materials),
+        Material::Mix { a, b, .. } => interior(*a, materials).or_else(|| interior(*b, materials)),
+        _ => None,
+    }
+}
+
+/// Tables already made, by index of refraction and width: equal materials share them.
+#[derive(Default)]
+struct KnownTables {
+    coats: HashMap<(u32, Option<u32>), u32>,
+    glasses: HashMap<(u32, Option<u32>), u32>,
+    reflectors: HashMap<u32, u32>,
+}
+
+impl KnownTables {
+    fn coat(&mut self, tables: &mut Vec<AlbedoTable<1>>, eta: f32, width: Width) -> Option<u32> {
+        Self::find(&mut self.coats, tables, eta, width, coat_table)
+    }
+
+    fn glass(&mut self, tables: &mut Vec<AlbedoTable<2>>, eta: f32, width: Width) -> Option<u32> {
+        Self::find(&mut self.glasses, tables, eta, width, glass_table)
+    }
+
+    /// `None` where the width is not constant: all such materials share one table.
+    fn reflector(&mut self, tables: &mut Vec<ReflectorTable>, width: Width) -> Option<u32> {
+        let Width::Constant(alpha) = width else {
+            if let Width::Texture(_) = width {
+                reflector_table(); // made now rather than under the first ray
+            }
+            return None;
+        };
+        Some(*self.reflectors.entry(alpha.to_bits()).or_insert_with(|| {
+            tables.push(reflector_table_at(alpha));
+            (tables.len() - 1) as u32
+        }))
+    }
+
+    fn find<const C: usize>(
+        known: &mut HashMap<(u32, Option<u32>), u32>,
+        tables: &mut Vec<AlbedoTable<C>>,
+        eta: f32,
+        width: Width,
+        make: impl FnOnce(f32, Widths) -> AlbedoTable<C>,
+    ) -> Option<u32> {
+        let widths = width.widths()?;
+        let width_bits = match widths {
+            Widths::One(alpha) => Some(alpha.to_bits()),
+            Widths::All => None,
+        };
+        Some(*known.entry((eta.to_bits(), width_bits)).or_insert_with(|| {
+            tables.push(make(eta, widths));
+            (tables.len() - 1) as u32
+        }))
+    }
+}

@@ -1,0 +1,433 @@
+//! The materials of a frame, compiled: what can be computed before a ray arrives is.
+//!
+//! A material says what a surface is made of; at a point it becomes a [`Bsdf`]. Constants are
+//! resolved once: metals to their indices, roughness to the GGX width `α = roughness²`, the energy
+//! tables of rough interfaces.
+
+mod compile;
+mod relief;
+
+pub(super) use compile::{Width, alpha, glass_width};
+pub use relief::{Surroundings, bent_normal};
+
+use super::bsdf::{
+    AlbedoTable, Bsdf, ConductorFresnel, Diffuse, Mirror, Principled, PrincipledParameters,
+    ReflectorLobe, ReflectorTable, RoughConductor, RoughDielectric, RoughPlastic, SmoothConductor,
+    SmoothDielectric, SmoothPlastic, ThinGlass, reflector_table,
+};
+use super::relative::RelativeTables;
+use super::texture::{TexturePoint, Textures};
+use crate::description::{Material, Rgb, Value};
+use crate::extract::NOTHING;
+use compile::{Kind, MetalColor};
+use relief::Relief;
+
+/// All materials of a frame and the textures which they read.
+///
+/// References between materials must not form a cycle (see [`material_cycle`]), and every index must be
+/// valid: the description sees to both. Reflectances, roughness and other shares read from a texture
+/// are limited to `[0, 1]`, which is where they are defined.
+#[derive(Clone, Debug)]
+pub struct MaterialTable {
+    materials: Vec<Compiled>,
+    textures: Textures,
+    coats: Vec<AlbedoTable<1>>,
+    glasses: Vec<AlbedoTable<2>>,
+    reflectors: Vec<ReflectorTable>,
+    /// Rough interfaces to other media than air.
+    relative: RelativeTables,
+}
+
+/// What is inside a solid dielectric.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interior {
+    /// Index of refraction relative to vacuum.
+    pub ior: f32,
+    /// Absorption coefficient per metre; `None` is perfectly clear.
+    pub sigma_a: Option<Rgb>,
+    /// Where solids overlap, the one of the highest priority is there.
+    pub priority: i32,
+}
+
+/// A [`Material`] with all that does not depend on the point resolved.
+#[derive(Clone, Debug)]
+struct Compiled {
+    kind: Kind,
+    /// Whether it, or one that it is mixed of, is masked.
+    has_opacity: bool,
+    /// Whether it chooses among lobes or sides.
+    needs_lobe: bool,
+    /// Whether it, or the first solid that it is mixed of, encloses a medium.
+    interior: Option<Interior>,
+    /// What turns its normals.
+    relief: Option<Relief>,
+}
+
+/// A material chosen of those that one is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// One which is made of no other.
+    pub material: u32,
+    /// The one that turns the normals; of several around one another, the innermost.
+    pub relief: Option<u32>,
+}
+
+/// A material which refers to itself through those that it is made of, if there is one.
+///
+/// # Panics
+/// If a reference is out of range.
+pub fn material_cycle(materials: &[Material<u32>]) -> Option<u32> {
+    cycle(materials.len() as u32, |index| match materials[index as usize] {
+        Material::Mix { a, b, .. } => vec![a, b],
+        Material::Masked { material, .. }
+        | Material::Bump { material, .. }
+        | Material::NormalMap { material, .. } => vec![material],
+        _ => Vec::new(),
+    })
+}
+
+/// A node of a graph that can be reached from itself, if there is one. `parts` are the nodes that a node refers to.
+pub fn cycle(count: u32, parts: impl Fn(u32) -> Vec<u32>) -> Option<u32> {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Visit {
+        Not,
+        Open,
+        Done,
+    }
+    fn visit(index: u32, parts: &impl Fn(u32) -> Vec<u32>, visits: &mut [Visit]) -> Option<u32> {
+        match visits[index as usize] {
+            Visit::Done => return None,
+            Visit::Open => return Some(index),
+            Visit::Not => visits[index as usize] = Visit::Open,
+        }
+        let found = parts(index).into_iter().find_map(|part| visit(part, parts, visits));
+        visits[index as usize] = Visit::Done;
+        found
+    }
+    let mut visits = vec![Visit::Not; count as usize];
+    (0..count).find_map(|index| visit(index, &parts, &mut visits))
+}
+
+impl MaterialTable {
+    /// Chooses what of a material is at a point.
+    ///
+    /// A mix chooses one of its sides with `u_lobe`, uniform in `[0, 1)`, and stretches what is
+    /// left of the number back to `[0, 1)`: it can choose the lobe of the BSDF afterwards. A
+    /// masked material is taken as opaque: ask [`MaterialTable::opacity`] first. The sides of
+    /// a mix are then weighted by their opacity, as they are where a ray has been stopped.
+    #[inline]
+    pub fn choose(&self, material: u32, at: &TexturePoint, u_lobe: &mut f32) -> Chosen {
+        let mut chosen = Chosen { material, relief: None };
+        loop {
+            chosen.material = match &self.materials[chosen.material as usize].kind {
+                Kind::Mix { a, b, amount } => self.choose_side(*a, *b, *amount, at, u_lobe),
+                Kind::Masked { material, .. } => *material,
+                Kind::Relief { material } => {
+                    chosen.relief = Some(chosen.material);
+                    *material
+                }
+                _ => return chosen,
+            };
+        }
+    }
+
+    /// How the material scatters at a point, [chosen](Self::choose) by `u_lobe`.
+    #[inline]
+    pub fn bsdf(&self, material: u32, at: &TexturePoint, u_lobe: &mut f32) -> Bsdf<'_> {
+        self.chosen_bsdf(self.choose(material, at, u_lobe).material, at)
+    }
+
+    /// How a material scatters that is made of no other.
+    ///
+    /// # Panics
+    /// If it is.
+    #[inline]
+    pub fn chosen_bsdf(&self, material: u32, at: &TexturePoint) -> Bsdf<'_> {
+        match &self.materials[material as usize].kind {
+            Kind::Diffuse { albedo } => Bsdf::Diffuse(Diffuse { albedo: self.share(albedo, at) }),
+            Kind::Mirror { reflectance } => {
+                Bsdf::Mirror(Mirror { reflectance: self.share(reflectance, at) })
+            }
+            Kind::Dielectric { eta, width, average, table } => {
+                match self.alpha(*width, at).zip(*table) {
+                    None => Bsdf::SmoothDielectric(SmoothDielectric { eta: *eta }),
+                    Some((alpha, table)) => {
+                        let lost = self.glasses[table as usize].at(alpha);
+                        Bsdf::RoughDielectric(RoughDielectric::new(*eta, lost, *average))
+                    }
+                }
+            }
+            Kind::ThinGlass { eta, tint } => {
+                Bsdf::ThinGlass(ThinGlass { eta: *eta, tint: self.share(tint, at) })
+            }
+            Kind::Conductor { fresnel, width, table } => {
+                let (fresnel, average) = match fresnel {
+                    MetalColor::Same(fresnel, average) => (*fresnel, *average),
+                    MetalColor::F0(f0) => {
+                        let fresnel = ConductorFresnel::Schlick { f0: self.share(f0, at) };
+                        (fresnel, fresnel.average())
+                    }
+                };
+                match self.reflector(*width, *table, at) {
+                    None => Bsdf::SmoothConductor(SmoothConductor { fresnel }),
+                    Some(lobe) => Bsdf::RoughConductor(RoughConductor::new(fresnel, average, lobe)),
+                }
+            }
+            Kind::Plastic { albedo, eta, width, average, table } => {
+                let rho = self.share(albedo, at);
+                match self.alpha(*width, at).zip(*table) {
+                    None => Bsdf::SmoothPlastic(SmoothPlastic::new(rho, *eta, *average)),
+                    Some((alpha, table)) => {
+                        let coat = self.coats[table as usize].at(alpha);
+                        Bsdf::RoughPlastic(RoughPlastic::new(rho, *eta, coat))
+                    }
+                }
+            }
+            Kind::Principled { base_color, metallic, width, table, ior, transmission } => {
+                let parameters = PrincipledParameters {
+                    base_color: self.share(base_color, at),
+                    metallic: self.scalar(metallic, at).clamp(0.0, 1.0),
+                    ior: *ior,
+                    transmission: self.scalar(transmission, at).clamp(0.0, 1.0),
+                };
+                let lobe = self.reflector(*width, *table, at);
+                Bsdf::Principled(Principled::new(&parameters, lobe))
+            }
+            Kind::Mix { .. } | Kind::Masked { .. } | Kind::Relief { .. } => {
+                unreachable!("a material was chosen")
+            }
+        }
+    }
+
+    /// Like [`MaterialTable::chosen_bsdf`] for a surface which has a solid of the material `outside` on its
+    /// outside, or air where that is `None`.
+    pub fn chosen_bsdf_within(
+        &self,
+        material: u32,
+        at: &TexturePoint,
+        outside: Option<u32>,
+    ) -> Bsdf<'_> {
+        let index = outside.and_then(|outside| self.interior(outside));
+        match (index, &self.materials[material as usize].kind) {
+            (Some(index), Kind::Dielectric { eta, .. }) => {
+                let eta = eta / index.ior;
+                let Some(pair) = self.relative.find(material, index.ior) else {
+                    return Bsdf::SmoothDielectric(SmoothDielectric { eta });
+                };
+                pair.bsdf(eta, |texture| self.textures.scalar(texture, at))
+            }
+            _ => self.chosen_bsdf(material, at),
+        }
+    }
+
+    /// Share of the rays which the surface stops, in `[0, 1]`: 1 unless it is masked.
+    #[inline]
+    pub fn opacity(&self, material: u32, at: &TexturePoint) -> f32 {
+        let compiled = &self.materials[material as usize];
+        if !compiled.has_opacity {
+            return 1.0;
+        }
+        match &compiled.kind {
+            Kind::Masked { material, opacity } => {
+                self.scalar(opacity, at).clamp(0.0, 1.0) * self.opacity(*material, at)
+            }
+            Kind::Mix { a, b, amount } => {
+                let amount = self.scalar(amount, at).clamp(0.0, 1.0);
+                (1.0 - amount) * self.opacity(*a, at) + amount * self.opacity(*b, at)
+            }
+            Kind::Relief { material } => self.opacity(*material, at),
+            _ => 1.0,
+        }
+    }
+
+    /// Whether a surface stops a ray: `None` where it passes through a hole.
+    ///
+    /// One number decides that and, stretched back to the whole interval `[0, 1)`, is left for another
+    /// choice; where nothing is to be decided it is not drawn.
+    #[inline]
+    pub fn stopped(
+        &self,
+        material: u32,
+        at: &TexturePoint,
+        u: impl FnOnce() -> f32,
+    ) -> Option<Option<f32>> {
+        let opacity = self.opacity(material, at);
+        if opacity >= 1.0 {
+            return Some(None);
+        }
+        let u = u();
+        (u < opacity).then(|| Some(u / opacity))
+    }
+
+    /// Whether [`MaterialTable::opacity`] can be other than 1.
+    #[inline]
+    pub fn has_opacity(&self, material: u32) -> bool {
+        self.materials[material as usize].has_opacity
+    }
+
+    /// Whether [`Bsdf::is_storable`] can be true of a point of the material.
+    pub fn may_be_storable(&self, material: u32, min_alpha: f32) -> bool {
+        match &self.materials[material as usize].kind {
+            Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Principled { .. } => true,
+            Kind::Mirror { .. } | Kind::ThinGlass { .. } => false,
+            Kind::Dielectric { width, .. } | Kind::Conductor { width, .. } => {
+                width.widest() >= min_alpha
+            }
+            Kind::Mix { a, b, .. } => {
+                self.may_be_storable(*a, min_alpha) || self.may_be_storable(*b, min_alpha)
+            }
+            Kind::Masked { material, .. } | Kind::Relief { material } => {
+                self.may_be_storable(*material, min_alpha)
+            }
+        }
+    }
+
+    /// Whether the material can pass light on so sharply that it makes caustics: by a lobe without
+    /// extent, or because it is not storable at some point.
+    pub fn may_cast_caustics(&self, material: u32, min_alpha: f32) -> bool {
+        match &self.materials[material as usize].kind {
+            Kind::Diffuse { .. } => false,
+            Kind::Mirror { .. } | Kind::ThinGlass { .. } => true,
+            Kind::Dielectric { width, .. }
+            | Kind::Conductor { width, .. }
+            | Kind::Principled { width, .. } => width.narrowest() < min_alpha,
+            // The rough coat goes with its base, which is diffuse.
+            Kind::Plastic { width, .. } => width.narrowest() == 0.0,
+            Kind::Mix { a, b, .. } => {
+                self.may_cast_caustics(*a, min_alpha) || self.may_cast_caustics(*b, min_alpha)
+            }
+            Kind::Masked { material, .. } | Kind::Relief { material } => {
+                self.may_cast_caustics(*material, min_alpha)
+            }
+        }
+    }
+
+    /// Number of materials.
+    pub fn len(&self) -> usize {
+        self.materials.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.materials.is_empty()
+    }
+
+    /// What a solid of this material holds; `None` for all but [`Material::Dielectric`], masked or
+    /// mixed with something else. Of a mix of two dielectrics the first counts.
+    #[inline]
+    pub fn interior(&self, material: u32) -> Option<Interior> {
+        self.materials[material as usize].interior
+    }
+
+    /// Whether [`MaterialTable::bsdf`] and what it returns look at the number for the choice of a lobe.
+    #[inline]
+    pub fn needs_lobe(&self, material: u32) -> bool {
+        self.materials[material as usize].needs_lobe
+    }
+
+    /// Absorption coefficient inside, per metre; `None` where nothing is absorbed.
+    #[inline]
+    pub fn attenuation(&self, material: u32) -> Option<Rgb> {
+        self.interior(material).and_then(|interior| interior.sigma_a)
+    }
+
+    /// Beer and Lambert's law: the share of light left after a distance in metres inside a solid of this
+    /// material; 1 in air ([`NOTHING`]).
+    #[inline]
+    pub fn transmittance(&self, material: u32, distance: f64) -> Rgb {
+        if material == NOTHING {
+            return Rgb::ONE;
+        }
+        // A channel which absorbs nothing stays 1 at any distance, 0·∞ included.
+        self.attenuation(material).map_or(Rgb::ONE, |sigma_a| {
+            sigma_a.map(|sigma| if sigma == 0.0 { 1.0 } else { (-sigma * distance as f32).exp() })
+        })
+    }
+
+    /// Whether light can be inside the object: [`MaterialTable::interior`] is something.
+    #[inline]
+    pub fn is_dielectric(&self, material: u32) -> bool {
+        self.interior(material).is_some()
+    }
+
+    /// A colour which is constant or textured, as it is: not limited to any range.
+    #[inline]
+    pub fn color(&self, value: &Value<Rgb, u32>, at: &TexturePoint) -> Rgb {
+        match *value {
+            Value::Constant(color) => color,
+            Value::Texture(texture) => self.textures.color(texture, at),
+        }
+    }
+
+    /// A number which is constant or textured, as it is: not limited to any range.
+    #[inline]
+    pub fn scalar(&self, value: &Value<f32, u32>, at: &TexturePoint) -> f32 {
+        match *value {
+            Value::Constant(number) => number,
+            Value::Texture(texture) => self.textures.scalar(texture, at),
+        }
+    }
+
+    /// The textures.
+    pub fn textures(&self) -> &Textures {
+        &self.textures
+    }
+
+    /// A colour which is a share of light.
+    #[inline]
+    fn share(&self, value: &Value<Rgb, u32>, at: &TexturePoint) -> Rgb {
+        self.color(value, at).map(|v| v.clamp(0.0, 1.0))
+    }
+
+    #[inline]
+    fn alpha(&self, width: Width, at: &TexturePoint) -> Option<f32> {
+        match width {
+            Width::Smooth => None,
+            Width::Constant(alpha) => Some(alpha),
+            Width::Texture(texture) => alpha(self.textures.scalar(texture, at)),
+        }
+    }
+
+    /// The lobe of a rough reflector; `table` is the one made for a constant width.
+    #[inline]
+    fn reflector(
+        &self,
+        width: Width,
+        table: Option<u32>,
+        at: &TexturePoint,
+    ) -> Option<ReflectorLobe<'_>> {
+        let alpha = self.alpha(width, at)?;
+        let table = match table {
+            Some(table) => &self.reflectors[table as usize],
+            None => reflector_table(),
+        };
+        Some(ReflectorLobe::new(table.at(alpha)))
+    }
+
+    /// Chooses a side of a mix by `u_lobe < p` and leaves in it a number uniform in `[0, 1)`.
+    fn choose_side(
+        &self,
+        a: u32,
+        b: u32,
+        amount: Value<f32, u32>,
+        at: &TexturePoint,
+        u_lobe: &mut f32,
+    ) -> u32 {
+        let amount = self.scalar(&amount, at).clamp(0.0, 1.0);
+        let weight_a = (1.0 - amount) * self.opacity(a, at);
+        let weight_b = amount * self.opacity(b, at);
+        // Where both are holes nothing is hit; any answer will do.
+        let p = if weight_b > 0.0 { weight_b / (weight_a + weight_b) } else { 0.0 };
+        let below_one = 1.0_f32.next_down();
+        if *u_lobe < p {
+            *u_lobe = (*u_lobe / p).min(below_one);
+            b
+        } else {
+            *u_lobe = ((*u_lobe - p) / (1.0 - p)).min(below_one);
+            a
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

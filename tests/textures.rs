@@ -1,0 +1,301 @@
+//! Textures in pictures: filtering, places, bump and normal maps.
+
+mod common;
+
+use common::{Picture, render, render_description, scene};
+use glam::{DVec3, Vec3};
+use kinora::description::{
+    Channel, Encoding, ImageData, ImagePixels, SceneTexture, Texture, TextureFilter,
+    TextureFiltering, Wrap,
+};
+
+/// A floor of checkers to the horizon under an even sky: its radiance is its albedo.
+const HORIZON: &str = r#"(
+    render: (filter: Box(radius: 0.5), max_depth: 1),
+    textures: { "checks": Checker(size: 0.5, a: 1, b: 0) },
+    materials: { "floor": Diffuse(albedo: "checks") },
+    entities: {
+        "camera": (transform: (translation: (0, 1, 0), rotation: (-10, 20, 0)), camera: (fov: 40)),
+        "floor": (shape: Plane(), material: "floor"),
+        "sky": (light: Sky(radiance: 1)),
+    },
+)"#;
+
+fn filtered(text: &str, filter: TextureFiltering, samples: u32) -> Picture {
+    let mut description = scene(text);
+    (description.render.size, description.render.samples) = ((96, 54), samples);
+    description.render.texture_filter = filter;
+    render_description(&description, 0)
+}
+
+/// Root of the mean square of the difference over rows.
+fn rms(a: &Picture, b: &Picture, rows: std::ops::Range<u32>) -> f64 {
+    let difference = |(x, y)| f64::from(a.at(x, y).y - b.at(x, y).y).powi(2);
+    let count = f64::from(96 * rows.len() as u32);
+    (rows.flat_map(|y| (0..96).map(move |x| (x, y))).map(difference).sum::<f64>() / count).sqrt()
+}
+
+/// Oracle: the same floor by very many samples at points. Near the horizon, where many fields lie in a pixel, 4
+/// filtered samples are as good as it says, and 4 at points are many times worse; where fields are larger than
+/// pixels filtering takes nothing away.
+#[test]
+fn checks_to_the_horizon_become_grey() {
+    let reference = filtered(HORIZON, TextureFiltering::Point, 4096);
+    let point = filtered(HORIZON, TextureFiltering::Point, 4);
+    let filtered = filtered(HORIZON, TextureFiltering::Anisotropic, 4);
+    // The horizon is in row 13.
+    let far = 14..20;
+    let [point_far, filtered_far] =
+        [&point, &filtered].map(|picture| rms(picture, &reference, far.clone()));
+    assert!(filtered_far < 0.08, "{filtered_far}");
+    assert!(point_far > 3.0 * filtered_far, "{point_far} {filtered_far}");
+    let near = 30..54;
+    let [point_near, filtered_near] =
+        [&point, &filtered].map(|picture| rms(picture, &reference, near.clone()));
+    assert!(filtered_near < 1.1 * point_near, "{filtered_near} {point_near}");
+}
+
+/// An image of checkers of 8 × 8 texels.
+fn checks(size: u32) -> SceneTexture {
+    let pixels = (0..size * size)
+        .map(|k| {
+            let v = f32::from(u8::from((k % size / 8 + k / size / 8).is_multiple_of(2)));
+            [v, v, v, 1.0]
+        })
+        .collect();
+    let file = ImageData { width: size, height: size, pixels: ImagePixels::Rgba32F(pixels) };
+    image(file)
+}
+
+fn image(file: ImageData) -> SceneTexture {
+    Texture::Image {
+        file: file.into(),
+        encoding: Encoding::Linear,
+        wrap: Wrap::Repeat,
+        filter: TextureFilter::Bilinear,
+        channel: Channel::Luminance,
+        repeat: glam::Vec2::splat(0.25),
+        offset: glam::Vec2::ZERO,
+    }
+}
+
+/// The same with an image: its pyramid against very many samples at points. Head on and far away it keeps the mean.
+#[test]
+fn images_are_filtered_by_their_pyramid() {
+    let mut description = scene(HORIZON);
+    description.textures.insert("checks".to_owned(), checks(64));
+    (description.render.size, description.render.samples) = ((96, 54), 4096);
+    description.render.texture_filter = TextureFiltering::Point;
+    let reference = render_description(&description, 0);
+    let mut by = |filter| {
+        description.render.texture_filter = filter;
+        description.render.samples = 4;
+        rms(&render_description(&description, 0), &reference, 14..20)
+    };
+    let point = by(TextureFiltering::Point);
+    let isotropic = by(TextureFiltering::Isotropic);
+    let anisotropic = by(TextureFiltering::Anisotropic);
+    assert!(anisotropic < 0.05, "{anisotropic}");
+    assert!(point > 3.0 * anisotropic && isotropic < point, "{point} {isotropic} {anisotropic}");
+}
+
+/// A ball and a box with solid textures, at rest and moved, turned and mirrored with their camera: the texture goes with
+/// the object.
+#[test]
+fn solid_textures_go_with_their_object() {
+    let at = |transform: &str, eye: &str| {
+        let text = format!(
+            r#"(
+    render: (max_depth: 1),
+    textures: {{ "clouds": Noise(size: 0.5), "rings": Wood(size: 0.1), "all": Multiply(a: "clouds", b: "rings") }},
+    materials: {{ "m": Diffuse(albedo: "all") }},
+    entities: {{
+        "camera": (parent: "group", transform: (translation: {eye}, look_at: (0, 0, 0)), camera: (fov: 40)),
+        "group": (transform: ({transform})),
+        "ball": (parent: "group", shape: Sphere(radius: 0.7), material: "m"),
+        "sky": (light: Sky(radiance: 1)),
+    }},
+)"#
+        );
+        render(&text, (32, 32), 64)
+    };
+    let still = at("", "(0, 0, 3)");
+    let moved = at("translation: (5, -7, 11), rotation: (30, 40, 50)", "(0, 0, 3)");
+    let mean = still.mean();
+    assert!(mean.mean > 0.02);
+    for y in 0..32 {
+        for x in 0..32 {
+            let (a, b) = (still.at(x, y).y, moved.at(x, y).y);
+            assert!((a - b).abs() < 0.12, "pixel {x}, {y}: {a} {b}");
+        }
+    }
+    let difference = (still.mean().mean - moved.mean().mean).abs();
+    assert!(difference < 3.0 * still.mean().error.hypot(moved.mean().error), "{difference}");
+}
+
+/// The mean normal that the camera sees on a square in front of it with this material.
+fn normal_on_square(textures: &str, material: &str) -> Vec3 {
+    let text = format!(
+        r#"(
+    render: (max_depth: 1, layers: [Beauty, Normal], filter: Box(radius: 0.5)),
+    textures: {{ {textures} }},
+    materials: {{ "flat": Diffuse(), "relief": {material} }},
+    entities: {{
+        "camera": (transform: (translation: (0, 0, 5)), camera: (orthographic: 0.004)),
+        "square": (shape: Rectangle(size: (1, 1)), material: "relief"),
+        "sky": (light: Sky(radiance: 1)),
+    }},
+)"#
+    );
+    let picture = render(&text, (4, 4), 16);
+    let planes = picture.film.image(kinora::description::Layer::Normal).expect("asked for");
+    let mean = |k: usize| match &planes[k].samples {
+        kinora::film::PlaneSamples::F32(values) => values.iter().sum::<f32>() / values.len() as f32,
+        kinora::film::PlaneSamples::U32(_) => panic!("normals are numbers"),
+    };
+    Vec3::new(mean(0), mean(1), mean(2))
+}
+
+/// Oracle (closed form): the height rises by `strength` over the width of 1 m; the normal of the raised surface leans
+/// back by the arc tangent of that, and by half a right angle at most, beyond which a mirror would reflect the
+/// camera's rays into the square.
+#[test]
+fn a_bump_map_has_the_normal_of_the_raised_surface() {
+    let ramp = r#""ramp": Gradient(a: 0, b: 1)"#;
+    for strength in [0.1_f32, -0.7, 2.0] {
+        let material = format!(r#"Bump(material: "flat", height: "ramp", strength: {strength:?})"#);
+        let normal = normal_on_square(ramp, &material);
+        let expected = Vec3::new(-strength.clamp(-1.0, 1.0), 0.0, 1.0).normalize();
+        assert!((normal - expected).length() < 1e-3, "{strength}: {normal} {expected}");
+    }
+}
+
+/// Oracle: a normal map that holds one normal; green up and down, and its strength.
+#[test]
+fn a_normal_map_holds_the_normal() {
+    let n = Vec3::new(0.36, -0.48, 0.8);
+    let coded = n * 0.5 + 0.5;
+    let map = format!(
+        r#""n": Gradient(a: ({0}, {1}, {2}), b: ({0}, {1}, {2}))"#,
+        coded.x, coded.y, coded.z
+    );
+    for (options, expected) in [
+        ("", n),
+        (", green: Down", Vec3::new(n.x, -n.y, n.z)),
+        (", strength: 0.5", Vec3::new(0.5 * n.x, 0.5 * n.y, n.z).normalize()),
+        (", strength: 0", Vec3::Z),
+    ] {
+        let material = format!(r#"NormalMap(material: "flat", map: "n"{options})"#);
+        let normal = normal_on_square(&map, &material);
+        assert!((normal - expected).length() < 1e-3, "{options}: {normal} {expected}");
+    }
+}
+
+/// Oracle: the height's own derivative: a bump map and the normal map made from the same sine light a wall alike, and
+/// both as the cosine of the normal says.
+#[test]
+fn a_bump_map_and_the_normal_map_of_its_height_are_lit_alike() {
+    let size = 512_u32;
+    let (turns, depth) = (4.0_f64, 0.004_f64);
+    let phase =
+        |k: u32| std::f64::consts::TAU * turns * (f64::from(k % size) + 0.5) / f64::from(size);
+    let texture = |value: &dyn Fn(u32) -> [f32; 4]| {
+        let pixels = (0..size * size).map(value).collect();
+        let file = ImageData { width: size, height: size, pixels: ImagePixels::Rgba32F(pixels) };
+        let mut texture = image(file);
+        if let Texture::Image { repeat, .. } = &mut texture {
+            *repeat = glam::Vec2::ONE;
+        }
+        texture
+    };
+    let height = texture(&|k| {
+        let v = (0.5 + 0.5 * phase(k).sin()) as f32;
+        [v, v, v, 1.0]
+    });
+    let normals = texture(&|k| {
+        let slope = 0.5 * depth * phase(k).cos() * std::f64::consts::TAU * turns;
+        let n = (DVec3::new(-slope, 0.0, 1.0).normalize() * 0.5 + 0.5).as_vec3();
+        [n.x, n.y, n.z, 1.0]
+    });
+    let lit = |material: &str| {
+        let text = format!(
+            r#"(
+    render: (max_depth: 1, filter: Box(radius: 0.5)),
+    textures: {{ "height": Checker(), "normals": Checker() }},
+    materials: {{ "flat": Diffuse(albedo: 1), "relief": {material} }},
+    entities: {{
+        "camera": (transform: (translation: (0, 0, 5)), camera: (orthographic: 0.0625)),
+        "square": (shape: Rectangle(size: (1, 1)), material: "relief"),
+        "sun": (transform: (rotation: (0, 45, 0)), light: Directional(irradiance: (3.1415927, 3.1415927, 3.1415927))),
+    }},
+)"#
+        );
+        let mut description = scene(&text);
+        description.textures.insert("height".to_owned(), height.clone());
+        description.textures.insert("normals".to_owned(), normals.clone());
+        (description.render.size, description.render.samples) = ((64, 4), 64);
+        render_description(&description, 0)
+    };
+    let bump = lit(&format!(r#"Bump(material: "flat", height: "height", strength: {depth:?})"#));
+    let mapped = lit(r#"NormalMap(material: "flat", map: "normals")"#);
+    for x in 0..64 {
+        let u = (f64::from(x) + 0.5) / 64.0;
+        let slope =
+            0.5 * depth * (std::f64::consts::TAU * turns * u).cos() * std::f64::consts::TAU * turns;
+        let n = DVec3::new(-slope, 0.0, 1.0).normalize();
+        let light = DVec3::new(1.0, 0.0, 1.0).normalize();
+        let expected = n.dot(light) as f32;
+        let (a, b) = (bump.at(x, 1).y, mapped.at(x, 1).y);
+        assert!((a - expected).abs() < 4e-3, "bump {x}: {a} {expected}");
+        assert!((b - expected).abs() < 4e-3, "normals {x}: {b} {expected}");
+    }
+}
+
+/// Steep bumps never make light: a white ball in an even sky is at most as bright as the sky, and has no black rim.
+#[test]
+fn steep_bumps_neither_make_nor_swallow_light() {
+    for material in ["Diffuse(albedo: 1)", "Mirror()", "Conductor(f0: 1, roughness: 0.3)"] {
+        let text = format!(
+            r#"(
+    textures: {{ "clouds": Noise(size: 0.1, octaves: 2) }},
+    materials: {{ "m": {material}, "bumpy": Bump(material: "m", height: "clouds", strength: 0.2) }},
+    entities: {{
+        "camera": (transform: (translation: (0, 0, 4)), camera: (orthographic: 1.9)),
+        "ball": (shape: Sphere(radius: 1), material: "bumpy"),
+        "sky": (light: Sky(radiance: 1)),
+    }},
+)"#
+        );
+        let picture = render(&text, (24, 24), 256);
+        let mean = picture.mean();
+        assert!(mean.mean <= 1.0 + 3.0 * mean.error + 4e-6, "{material}: {mean:?}");
+        assert!(mean.mean > 0.8, "{material}: {mean:?}");
+        let darkest = picture.green().into_iter().fold(f64::INFINITY, f64::min);
+        assert!(darkest > 0.3, "{material}: {darkest}");
+    }
+}
+
+/// Photons see bumps and textures as paths do.
+#[test]
+fn photons_and_paths_see_the_same_textures() {
+    let by = |integrator: &str| {
+        let text = format!(
+            r#"(
+    render: (integrator: {integrator}),
+    textures: {{ "clouds": Noise(size: 0.4, a: 0.1, b: 0.9), "height": Noise(size: 0.2, octaves: 1) }},
+    materials: {{ "m": Diffuse(albedo: "clouds"), "bumpy": Bump(material: "m", height: "height", strength: 0.05) }},
+    entities: {{
+        "camera": (transform: (translation: (0, 0, 2.4)), camera: (fov: 40)),
+        "room": (shape: Box(size: (2, 2, 5)), material: "bumpy"),
+        "lamp": (transform: (translation: (0, 0.99, 0), rotation: (90, 0, 0)), shape: Rectangle(size: (0.5, 0.5)),
+                 emission: Radiance(5)),
+    }},
+)"#
+        );
+        render(&text, (16, 16), 1024).mean()
+    };
+    let (path, sppm) = (by("Path"), by("Sppm"));
+    let error = path.error.hypot(sppm.error);
+    assert!((path.mean - sppm.mean).abs() < 3.0 * error, "{path:?} {sppm:?}");
+    assert!(error < 0.02 * path.mean, "{path:?} {sppm:?}");
+}
