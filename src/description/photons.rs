@@ -54,6 +54,10 @@ pub struct PhotonSettings {
     /// Photons in an estimate of `PhotonMap`: the radius is that of so many, at most the one above.
     /// Trades noise for blur (bias).
     pub nearest: u32,
+    /// With the final gathering of `PhotonMap` one in so many photons makes a place where the irradiance is
+    /// computed beforehand, for the gathering's rays to take; 0 has each ray look for its own photons. Trades time
+    /// for blur (bias), up to twice that of the radius.
+    pub places: u32,
     /// Weight over the disk.
     pub kernel: Kernel,
     /// How `Sppm` finds light which comes straight from a lamp.
@@ -73,6 +77,7 @@ impl Default for PhotonSettings {
             radius: 3.0,
             largest_radius: 0.1,
             nearest: 60,
+            places: 8,
             kernel: Kernel::default(),
             direct: DirectLight::default(),
             min_roughness: 0.4,

@@ -25,7 +25,7 @@ use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
 use crate::build::nesting::Meeting;
-use crate::build::photon::{PhotonMap, QueryPoint};
+use crate::build::photon::{IrradianceMap, KnownIrradiance, PhotonMap, QueryPoint, least_radius};
 use crate::description::{DirectLight, PhotonSettings, Rgb};
 use crate::extract::{CameraRay, Method, NOTHING};
 use crate::film::PixelSample;
@@ -34,12 +34,11 @@ use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
 
 /// How much wider photons are gathered at points which the camera sees by a diffuse bounce: the
 /// bounce blurs what is found there anyway.
 const BEHIND_DIFFUSE: f32 = 2.0;
-/// Units in the last place of a position below which a disk cannot be resolved.
-const LEAST_RADIUS_ULPS: f32 = 32.0;
 
 /// The photons of a pass.
 #[derive(Clone, Copy)]
@@ -48,6 +47,8 @@ pub(super) struct Maps<'a> {
     pub global: &'a PhotonMap,
     /// Caustics, where they are kept apart.
     pub caustics: &'a PhotonMap,
+    /// Where the irradiance of `global` is known beforehand.
+    pub irradiance: &'a IrradianceMap,
 }
 
 /// Follows camera paths for the methods with photons.
@@ -101,6 +102,15 @@ pub(super) struct Gathered {
 impl Default for Gathered {
     fn default() -> Self {
         Self { found: 0, radii: (f32::INFINITY, 0.0), unresolved: 0 }
+    }
+}
+
+impl Gathered {
+    /// Takes note of a disk.
+    fn note(&mut self, radius: f32, unresolved: bool) {
+        let (min, max) = self.radii;
+        self.radii = (min.min(radius), max.max(radius));
+        self.unresolved += u32::from(unresolved);
     }
 }
 
@@ -381,6 +391,18 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
 
     /// Reads all photons at the end of a ray of a final gathering; `false` if the ray is too short.
     fn read(&self, walk: &Walk<I>, hit: &Hit, vertex: &Vertex, context: &mut Context) -> bool {
+        if let Bsdf::Diffuse(diffuse) = vertex.bsdf
+            && let Some(known) = self.known(walk, vertex)
+        {
+            if hit.t < f64::from(known.radius) {
+                return false;
+            }
+            let unresolved = known.radius <= least_radius(vertex.surface.p.as_vec3());
+            context.gathered.note(known.radius, unresolved);
+            let light = diffuse.albedo * known.irradiance * FRAC_1_PI;
+            context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+            return true;
+        }
         let query = self.query(self.maps.global, walk, vertex, context);
         if hit.t < f64::from(query.radius) {
             return false;
@@ -388,6 +410,18 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let light = self.estimate(self.maps.global, &query, walk, vertex, context);
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
         true
+    }
+
+    /// The irradiance on the side from which the path came, where it is known beforehand and all its photons
+    /// have met no more surfaces than the path may.
+    fn known(&self, walk: &Walk<I>, vertex: &Vertex) -> Option<&KnownIrradiance> {
+        let surface = &vertex.surface;
+        let normal = if vertex.wo.dot(surface.ng) < 0.0 { -surface.ng } else { surface.ng };
+        let position = surface.p.as_vec3();
+        let query = QueryPoint { position, normal, radius: self.largest_radius };
+        let allowed = self.path.max_depth.saturating_sub(walk.depth);
+        let known = self.maps.irradiance.nearest(&query);
+        known.filter(|known| u32::from(known.deepest) < allowed)
     }
 
     /// Sends the rays of a final gathering over the lobes which are not deltas.
@@ -470,18 +504,15 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             let wider = if walk.since == Since::Never { 1.0 } else { BEHIND_DIFFUSE };
             (self.settings.radius * footprint * wider).min(self.largest_radius)
         };
-        let ulp = position.abs().max_element() * f32::EPSILON;
-        let least = LEAST_RADIUS_ULPS * ulp;
         let mut radius = first * context.scale;
         let mut query = QueryPoint { position, normal: surface.ng, radius };
         if nearest {
             let count = self.settings.nearest as usize;
             radius = map.radius_of(&query, count, &mut context.distances);
         }
-        context.gathered.unresolved += u32::from(radius < least);
+        let least = least_radius(position);
         query.radius = radius.max(least);
-        let (min, max) = context.gathered.radii;
-        context.gathered.radii = (min.min(query.radius), max.max(query.radius));
+        context.gathered.note(query.radius, radius < least);
         query
     }
 
@@ -523,11 +554,22 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             if !vertex.is_consistent(wi) {
                 return;
             }
-            let f = bsdf_value(&vertex.bsdf, wo_local, vertex.frame.to_local(wi));
-            light += f * photon.power * kernel.weight(distance2, radius2);
+            let weight = kernel.weight(distance2, radius2);
+            match vertex.bsdf {
+                Bsdf::Diffuse(_) if vertex.crosses(wi) => {}
+                // The same for all: it is multiplied by at the end.
+                Bsdf::Diffuse(_) => light += photon.power * weight,
+                _ => {
+                    let f = bsdf_value(&vertex.bsdf, wo_local, vertex.frame.to_local(wi));
+                    light += f * photon.power * weight;
+                }
+            }
         });
         context.gathered.found += found;
-        light
+        match vertex.bsdf {
+            Bsdf::Diffuse(diffuse) => light * diffuse.albedo * FRAC_1_PI,
+            _ => light,
+        }
     }
 }
 

@@ -18,7 +18,8 @@ use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
 use crate::build::light::{Aim, PhotonSource};
 use crate::build::photon::{
-    Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
+    IrradianceMap, Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
+    PlaceSettings,
 };
 use crate::description::DirectLight;
 use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
@@ -49,6 +50,7 @@ pub struct PhotonScratch {
     store: PhotonStore,
     global: PhotonMap,
     caustics: PhotonMap,
+    irradiance: IrradianceMap,
     faults: NestingFaults,
 }
 
@@ -299,38 +301,49 @@ impl<'a> Setting<'a> {
         report: &mut PhotonReport,
     ) -> Option<()> {
         let cancel = &self.job.control.cancel;
-        let mut faults = scratch.faults;
-        let mut take =
-            |keep: Keep, store: &mut PhotonStore, map: &mut PhotonMap, wanted: Wanted| {
-                let start = Instant::now();
-                let counters: PhotonCounters =
-                    self.tracer::<O, I>(keep).trace_pass(pass, store, cancel)?;
-                let traced = Instant::now();
-                map.rebuild(store, |photon| wanted == Wanted::All || !photon.caustic);
-                report.trace_seconds += (traced - start).as_secs_f64();
-                report.build_seconds += traced.elapsed().as_secs_f64();
-                report.emitted += counters.emitted;
-                faults = faults.plus(counters.nesting);
-                report.stored += counters.stored;
-                self.job.control.rays.fetch_add(counters.rays, Relaxed);
-                Some(map.len() as u64)
-            };
+        let PhotonScratch { store, global, caustics, irradiance, faults } = scratch;
+        let mut take = |keep: Keep, build: &mut dyn FnMut(&PhotonStore)| {
+            let start = Instant::now();
+            let counters: PhotonCounters =
+                self.tracer::<O, I>(keep).trace_pass(pass, store, cancel)?;
+            let traced = Instant::now();
+            build(store);
+            report.trace_seconds += (traced - start).as_secs_f64();
+            report.build_seconds += traced.elapsed().as_secs_f64();
+            report.emitted += counters.emitted;
+            *faults = faults.plus(counters.nesting);
+            report.stored += counters.stored;
+            self.job.control.rays.fetch_add(counters.rays, Relaxed);
+            Some(())
+        };
         if let Some(keep) = self.global_keep() {
             // Without a final gathering the caustics are read from their own map.
-            let direct = self.method == Method::PhotonMap && keep == Keep::Indirect;
-            let wanted = if direct { Wanted::NoCaustics } else { Wanted::All };
-            let stored = take(keep, &mut scratch.store, &mut scratch.global, wanted)?;
-            report.global = report.global.max(stored);
+            let apart = self.method == Method::PhotonMap && keep == Keep::Indirect;
+            take(keep, &mut |store| match self.places() {
+                Some(places) => irradiance.rebuild(store, pass.emitted, global, &places),
+                None => global.rebuild(store, |photon| !(apart && photon.caustic)),
+            })?;
+            report.global = report.global.max(global.len() as u64);
         }
         if self.has_caustic_map() {
-            let stored =
-                take(Keep::Caustics, &mut scratch.store, &mut scratch.caustics, Wanted::All)?;
-            report.caustics = report.caustics.max(stored);
+            take(Keep::Caustics, &mut |store| caustics.rebuild(store, |_| true))?;
+            report.caustics = report.caustics.max(caustics.len() as u64);
         }
-        scratch.faults = faults;
-        let memory = scratch.store.memory() + scratch.global.memory() + scratch.caustics.memory();
+        let memory = store.memory() + global.memory() + caustics.memory() + irradiance.memory();
         report.memory_bytes = report.memory_bytes.max(memory as u64);
         Some(())
+    }
+
+    /// How irradiance is computed beforehand, if it is.
+    fn places(&self) -> Option<PlaceSettings> {
+        let settings = self.job.settings;
+        let gathers = self.method == Method::PhotonMap && settings.final_gather > 0;
+        gathers.then(|| PlaceSettings {
+            one_in: settings.photons.places,
+            nearest: settings.photons.nearest as usize,
+            largest_radius: self.largest_radius(),
+            kernel: settings.photons.kernel,
+        })
     }
 
     /// Renders all passes; `None` when the control cancelled it.
@@ -389,24 +402,26 @@ impl<'a> Setting<'a> {
     ) -> EyeTracer<'b, O, I> {
         let settings = self.job.settings;
         let (side, growth) = self.scene.camera.pixel_size(time);
-        let reach = self.source.reach.map_or(f64::INFINITY, |reach| reach.radius);
         EyeTracer {
             path,
             method: self.method,
             settings: &settings.photons,
             final_gather: settings.final_gather,
-            maps: Maps { global: &scratch.global, caustics: &scratch.caustics },
+            maps: Maps {
+                global: &scratch.global,
+                caustics: &scratch.caustics,
+                irradiance: &scratch.irradiance,
+            },
             pixel_size: (side as f32, growth as f32),
-            largest_radius: settings.photons.largest_radius * reach as f32,
+            largest_radius: self.largest_radius(),
         }
     }
-}
 
-/// Which photons of a store go into a map.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Wanted {
-    All,
-    NoCaustics,
+    /// Greatest radius over which photons are gathered, metres.
+    fn largest_radius(&self) -> f32 {
+        let reach = self.source.reach.map_or(f64::INFINITY, |reach| reach.radius);
+        self.job.settings.photons.largest_radius * reach as f32
+    }
 }
 
 impl TileState {

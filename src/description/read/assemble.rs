@@ -312,6 +312,7 @@ fn check_photons(photons: &PhotonSettings, cursor: &Cursor, report: &mut Report)
         ("radius", f64::from(photons.radius), &limits::RADIUS),
         ("largest_radius", f64::from(photons.largest_radius), &limits::POSITIVE_SHARE),
         ("nearest", f64::from(photons.nearest), &limits::NEAREST),
+        ("places", f64::from(photons.places), &limits::PLACES),
         ("min_roughness", f64::from(photons.min_roughness), &limits::SHARE),
         ("max_memory", f64::from(photons.max_memory), &limits::MEBIBYTES),
     ];
