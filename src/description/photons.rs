@@ -48,6 +48,10 @@ pub struct PhotonSettings {
     pub alpha: f32,
     /// Radius of the first pass in pixels at the point. Trades blur (bias) for noise.
     pub radius: f32,
+    /// With `Sppm`, photons which suffice in the first pass: where more are found the radius of the pixel begins as small as
+    /// holds so many, down to half a pixel; 0 has all begin alike. Trades noise for blur (bias) of
+    /// bright caustics.
+    pub enough: u32,
     /// Greatest radius of the first pass, as a share of the radius of the scene. Bounds the blur where
     /// pixels are large.
     pub largest_radius: f32,
@@ -75,6 +79,7 @@ impl Default for PhotonSettings {
             per_pass: None,
             alpha: 2.0 / 3.0,
             radius: 3.0,
+            enough: 16,
             largest_radius: 0.1,
             nearest: 60,
             places: 8,

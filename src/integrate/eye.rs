@@ -40,6 +40,9 @@ use std::f32::consts::FRAC_1_PI;
 /// bounce blurs what is found there anyway.
 const BEHIND_DIFFUSE: f32 = 2.0;
 
+/// Least radius, in pixels, with which a pixel begins: blur which is narrower than the pixel is not seen.
+const SMALLEST_FIRST: f32 = 0.5;
+
 /// The photons of a pass.
 #[derive(Clone, Copy)]
 pub(super) struct Maps<'a> {
@@ -88,6 +91,15 @@ impl SampleKey {
     }
 }
 
+/// How large a disk a path begins with.
+#[derive(Clone, Copy)]
+pub(super) struct FirstDisk {
+    /// Factor on the radius of the first pass.
+    pub scale: f32,
+    /// Photons with which the first disk that holds any is content; 0 where it is as large as it is.
+    pub enough: u32,
+}
+
 /// What a pass found for a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathered {
@@ -97,11 +109,13 @@ pub(super) struct Gathered {
     pub radii: (f32, f32),
     /// Disks which could not shrink further.
     pub unresolved: u32,
+    /// Part of the radius with which the pixel was content.
+    pub part: f32,
 }
 
 impl Default for Gathered {
     fn default() -> Self {
-        Self { found: 0, radii: (f32::INFINITY, 0.0), unresolved: 0 }
+        Self { found: 0, radii: (f32::INFINITY, 0.0), unresolved: 0, part: 1.0 }
     }
 }
 
@@ -142,14 +156,15 @@ struct Walk<I> {
     reads: bool,
     /// Whether it only looks for a light.
     last: bool,
+    /// Whether it may still be split in two at a surface of glass.
+    whole: bool,
 }
 
 /// What goes along with all walks of a sample.
 struct Context<'a> {
     key: SampleKey,
     camera_ray: &'a CameraRay,
-    /// Factor on the radius of the first pass.
-    scale: f32,
+    first_disk: FirstDisk,
     counters: &'a mut PathCounters,
     gathered: Gathered,
     sample: PixelSample,
@@ -162,7 +177,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         &self,
         camera_ray: &CameraRay,
         key: SampleKey,
-        scale: f32,
+        first_disk: FirstDisk,
         counters: &mut PathCounters,
     ) -> (PixelSample, Gathered) {
         let walk = Walk {
@@ -177,11 +192,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             length: 0.0,
             reads: false,
             last: false,
+            whole: true,
         };
         let mut context = Context {
             key,
             camera_ray,
-            scale,
+            first_disk,
             counters,
             gathered: Gathered::default(),
             sample: PixelSample { radiance: Rgb::ZERO, first_hit: None },
@@ -301,6 +317,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         if gathers {
             self.final_gathering(walk, &vertex, &receiver, &sides, context);
         }
+        let lobe = self.split(walk, &vertex, (lobe, direction), &sides, sampler, context);
         let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { return false };
         let diffuse = storable && !drawn.delta;
         if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
@@ -320,6 +337,40 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             walk.throughput /= survival;
         }
         true
+    }
+
+    /// Splits the first path which meets glass: the likelier one of mirror image and refracted ray is followed here to its
+    /// end; returns the number which chooses the other for `walk`, whose throughput is now that share.
+    ///
+    /// Either one draws its number from its own share of `[0, 1)`, so that the sum has the mean of a single path,
+    /// whatever is made of the number. A lamp whose image in glass one path in twenty-five would see is seen by all of
+    /// them.
+    fn split(
+        &self,
+        walk: &mut Walk<I>,
+        vertex: &Vertex,
+        (lobe, direction): (f32, Vec2),
+        sides: &Sides<I>,
+        sampler: &Sampler,
+        context: &mut Context,
+    ) -> f32 {
+        if !(walk.whole && walk.since == Since::Never) {
+            return lobe;
+        }
+        let wo = vertex.frame.to_local(vertex.wo);
+        let Some(p) = vertex.bsdf.first_of_two_deltas(wo) else { return lobe };
+        walk.whole = false;
+        let (first, second) = (p * lobe, p + (1.0 - p) * lobe);
+        let ((likely, share), (other, rest)) =
+            if p > 0.5 { ((first, p), (second, 1.0 - p)) } else { ((second, 1.0 - p), (first, p)) };
+        if let Some((wi, drawn)) = vertex.scatter(likely, direction) {
+            let mut branch = *walk;
+            branch.throughput *= share;
+            self.turn(&mut branch, vertex, &vertex.receiver(), (wi, &drawn), false, sides);
+            self.walk(branch, sampler, context);
+        }
+        walk.throughput *= rest;
+        other
     }
 
     /// Whether a path ends where a diffuse lobe would take it on; otherwise `Sppm` and `PhotonMap` send one ray
@@ -494,21 +545,31 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let surface = &vertex.surface;
         let position = surface.p.as_vec3();
         let nearest = self.method == Method::PhotonMap;
+        let (side, growth) = self.pixel_size;
+        // A pixel is stretched where the surface is seen from the side.
+        let stretch = vertex.wo.dot(surface.ng).abs().sqrt();
+        let footprint = (side + growth * walk.length as f32) / stretch;
         let first = if nearest {
             self.largest_radius
         } else {
-            let (side, growth) = self.pixel_size;
-            // A pixel is stretched where the surface is seen from the side.
-            let stretch = vertex.wo.dot(surface.ng).abs().sqrt();
-            let footprint = (side + growth * walk.length as f32) / stretch;
             let wider = if walk.since == Since::Never { 1.0 } else { BEHIND_DIFFUSE };
             (self.settings.radius * footprint * wider).min(self.largest_radius)
         };
-        let mut radius = first * context.scale;
+        let FirstDisk { scale, enough } = context.first_disk;
+        let mut radius = first * scale;
         let mut query = QueryPoint { position, normal: surface.ng, radius };
         if nearest {
             let count = self.settings.nearest as usize;
             radius = map.radius_of(&query, count, &mut context.distances);
+        } else if enough > 0 {
+            // What is smaller than the pixel is not seen.
+            let within = map.radius_of(&query, enough as usize, &mut context.distances);
+            let content = within.max(SMALLEST_FIRST * footprint).min(radius);
+            if !context.distances.is_empty() {
+                context.gathered.part = content / radius;
+                context.first_disk = FirstDisk { scale: scale * content / radius, enough: 0 };
+            }
+            radius = content;
         }
         let least = least_radius(position);
         query.radius = radius.max(least);

@@ -11,7 +11,7 @@
 //! Every pass is a sample of each pixel (see `radius.rs` for why that is right), so that the film, its
 //! variance and the record of the frame are the same as of any other integrator.
 
-use super::eye::{EyeTracer, Gathered, Maps, SampleKey};
+use super::eye::{EyeTracer, FirstDisk, Gathered, Maps, SampleKey};
 use super::film_pass::{Around, Begin, IntegrateStatus, Job};
 use super::radius::{PixelRadius, shrunk_by_passes};
 use super::scene_view::{SceneTables, SceneView};
@@ -468,7 +468,11 @@ impl TileState {
                 Method::PhotonMap => 1.0,
                 Method::Path | Method::PathWithPhotons => by_passes,
             };
-            let (sample, gathered) = tracer.sample(&ray, key, scale, &mut self.counters);
+            let begins = setting.method == Method::Sppm && radius.is_fresh();
+            let enough = if begins { settings.photons.enough } else { 0 };
+            let first_disk = FirstDisk { scale, enough };
+            let (sample, gathered) = tracer.sample(&ray, key, first_disk, &mut self.counters);
+            radius.begin_with(gathered.part);
             radius.absorb(gathered.found, alpha);
             self.gathered.include(&gathered);
             self.buffer.add(x, y, &sample);
