@@ -281,7 +281,11 @@ impl<'a> Setting<'a> {
 
     fn photon_pass(&self, pass: u32, emitted: u32, time: f32) -> PhotonPass {
         let Job { settings, frame, .. } = self.job;
-        PhotonPass { seed: settings.seed, frame: *frame, pass, emitted, time }
+        // What is read from the same photons over a whole frame has their noise in it, as blotches which no
+        // average over the frame's samples takes out. They stay where they are from frame to frame, and
+        // change only where something does.
+        let frame = if self.method == Method::PhotonMap { 0 } else { *frame };
+        PhotonPass { seed: settings.seed, frame, pass, emitted, time }
     }
 
     /// The time of a pass.
