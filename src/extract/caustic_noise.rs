@@ -36,6 +36,30 @@ impl Sums {
     }
 }
 
+/// Luminance of each texture in the mean, where it was asked for.
+#[derive(Debug, Default)]
+pub struct TextureMeans(Vec<Option<f64>>);
+
+impl TextureMeans {
+    /// Forgets them, for textures have changed.
+    pub(super) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// Luminance of a colour, of a texture in the mean.
+    fn of(&mut self, value: &Value<Rgb, u32>, materials: &MaterialTable) -> f64 {
+        match value {
+            Value::Constant(color) => f64::from(luminance(*color)),
+            Value::Texture(index) => {
+                let (index, textures) = (*index as usize, materials.textures());
+                self.0.resize(textures.len(), None);
+                let Some(known) = self.0.get_mut(index) else { return 0.0 };
+                *known.get_or_insert_with(|| f64::from(luminance(average(&textures[index]))))
+            }
+        }
+    }
+}
+
 /// The relative variance of caustics on one path, points of light left out; 0 where nothing shines.
 ///
 /// `casts` says of a material whether it casts caustics.
@@ -44,6 +68,7 @@ pub(super) fn caustic_noise(
     lights: &[PunctualLight],
     emissions: &Emissions,
     surfaces: &Surfaces,
+    means: &mut TextureMeans,
     casts: impl Fn(u32) -> bool,
 ) -> f64 {
     let (mut whole, mut casters, mut lamps) = (Aabb::EMPTY, 0.0, Sums::default());
@@ -57,7 +82,7 @@ pub(super) fn caustic_noise(
         }
         if let Some(emission) = emissions.list.get(instance.emission as usize) {
             let strength = match &emission.strength {
-                EmissionStrength::Radiance(value) => mean(value, &surfaces.materials),
+                EmissionStrength::Radiance(value) => means.of(value, &surfaces.materials),
                 EmissionStrength::Power(power) => f64::from(luminance(*power)) / (PI * area),
             };
             if area.is_finite() && area > 0.0 {
@@ -74,22 +99,11 @@ pub(super) fn caustic_noise(
                 lamps.add(share * whole, f64::from(luminance(*irradiance)) / (PI * share));
             }
             Light::Sky { radiance, scale } => {
-                lamps.add(whole, mean(radiance, &surfaces.materials) * f64::from(*scale));
+                lamps.add(whole, means.of(radiance, &surfaces.materials) * f64::from(*scale));
             }
             Light::Directional { .. } | Light::Point { .. } | Light::Spot { .. } => {}
         }
     }
     let noise = casters * lamps.second / (lamps.first * lamps.first);
     if noise.is_nan() { 0.0 } else { noise }
-}
-
-/// Luminance of a colour, of a texture in the mean.
-fn mean(value: &Value<Rgb, u32>, materials: &MaterialTable) -> f64 {
-    let color = match value {
-        Value::Constant(color) => *color,
-        Value::Texture(index) => {
-            materials.textures().get(*index as usize).map_or(Rgb::ZERO, average)
-        }
-    };
-    f64::from(luminance(color))
 }

@@ -1,6 +1,6 @@
 //! Which integrator takes a frame, and which paths of it that integrator cannot find.
 
-use super::caustic_noise::caustic_noise;
+use super::caustic_noise::{TextureMeans, caustic_noise};
 use super::{
     Emissions, Feature, Geometry, Instance, Instances, NOTHING, PunctualLights, Requirements,
     Surfaces,
@@ -13,7 +13,8 @@ use bevy_ecs::prelude::*;
 /// From this relative variance of caustics on photons bring them: it is that of all else on a path. The decision
 /// note `auto.md` has the measurements.
 const NOISE_FOR_PHOTONS: f64 = 1.0;
-/// Passes below which what moves looks like under a stroboscope, since all of a pass has one time.
+/// Passes below which what moves looks like under a stroboscope, since all of a pass has one time. Caustics of this
+/// relative variance are not found even by so many paths: then a stroboscope is the lesser evil.
 const PASSES_FOR_MOTION: u32 = 64;
 
 /// The integrators as they are run.
@@ -103,7 +104,10 @@ impl Facts<'_> {
         if planes > 0 {
             return (Method::Path, "photons cannot start from emitting planes".to_owned());
         }
-        if requirements.has(Feature::Motion) && settings.samples < PASSES_FOR_MOTION {
+        let found_by_paths = noise < f64::from(PASSES_FOR_MOTION);
+        let moving = [Feature::Motion, Feature::CameraMotion, Feature::Deformation];
+        let moves = moving.into_iter().any(|feature| requirements.has(feature));
+        if moves && settings.samples < PASSES_FOR_MOTION && found_by_paths {
             return (
                 Method::Path,
                 format!(
@@ -117,6 +121,7 @@ impl Facts<'_> {
 }
 
 /// Writes [`ChosenIntegrator`] when it is different from before.
+#[expect(clippy::too_many_arguments, reason = "the signature lists what the choice depends on")]
 pub fn choose_integrator(
     settings: Res<Settings>,
     requirements: Res<Requirements>,
@@ -124,8 +129,12 @@ pub fn choose_integrator(
     lights: Res<PunctualLights>,
     emissions: Res<Emissions>,
     surfaces: Res<Surfaces>,
+    mut means: Local<TextureMeans>,
     mut chosen: ResMut<ChosenIntegrator>,
 ) {
+    if surfaces.is_changed() {
+        means.clear();
+    }
     let settings = &settings.0;
     let (points, planes) = (count_points(&lights), count_planes(&instances));
     let caustics = requirements.has(Feature::Caustics);
@@ -138,7 +147,7 @@ pub fn choose_integrator(
             let min_alpha = settings.photons.min_alpha();
             let casts = |material| surfaces.materials.may_cast_caustics(material, min_alpha);
             let noise = if caustics {
-                caustic_noise(&instances, &lights.0, &emissions, &surfaces, casts)
+                caustic_noise(&instances, &lights.0, &emissions, &surfaces, &mut means, casts)
             } else {
                 0.0
             };
@@ -234,25 +243,27 @@ mod tests {
         }
     }
 
+    /// Another lamp.
+    fn second(side: f32, radiance: f32) -> String {
+        format!(
+            r#""second": (transform: (translation: (0.9, 1.9, 0)), shape: Rectangle(size: ({side}, {side})), emission: Radiance(({radiance}, {radiance}, {radiance}))),"#
+        )
+    }
+
     /// With a second lamp of area `a` and radiance `L` the sums are `2·5² + 2a·L²` and `2·5 + 2a·L`: what is as bright
     /// adds to the area, what is dim changes nothing, a bright spark decides.
     #[test]
     fn lamps_count_by_what_they_contribute() {
-        let lamp = |side: f32, radiance: f32| {
-            format!(
-                r#""second": (transform: (translation: (0.9, 1.9, 0)), shape: Rectangle(size: ({side}, {side})), emission: Radiance(({radiance}, {radiance}, {radiance}))),"#
-            )
-        };
         for (second, expected) in [
-            (lamp(0.01, 5.0), Method::Path),
-            (lamp(0.01, 0.1), Method::Path),
+            (second(0.01, 5.0), Method::Path),
+            (second(0.01, 0.1), Method::Path),
             // 1.88·(50 + 2e-4·1e10)/(10 + 2e-4·1e5)² = 4200
-            (lamp(0.01, 1e5), Method::PathWithPhotons),
+            (second(0.01, 1e5), Method::PathWithPhotons),
         ] {
             assert_eq!(taken(0.28, 1.0, 64, "", &second), expected, "{second}");
         }
         // As large and as bright: half of the noise.
-        assert_eq!(taken(0.3, 1.0, 64, "", &lamp(1.0, 5.0)), Method::Path);
+        assert_eq!(taken(0.3, 1.0, 64, "", &second(1.0, 5.0)), Method::Path);
     }
 
     #[test]
@@ -265,5 +276,6 @@ mod tests {
         assert_eq!(taken(0.5, 1.0, 63, moving, ""), Method::Path);
         assert_eq!(taken(0.5, 1.0, 64, moving, ""), Method::PathWithPhotons);
         assert_eq!(taken(0.5, 1.0, 4, "", ""), Method::PathWithPhotons);
+        assert_eq!(taken(0.5, 1.0, 4, moving, &second(0.01, 1e5)), Method::PathWithPhotons);
     }
 }
