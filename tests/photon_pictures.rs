@@ -47,7 +47,7 @@ const SPHERE: &str = r#"(
 #[test]
 fn a_lit_diffuse_sphere_reads_one_at_every_size() {
     for direct in ["Sampled", "Photons"] {
-        for (side, passes) in [(1, 64), (4, 32), (10, 16), (256, 1)] {
+        for (side, passes) in [(1, 32), (4, 16), (10, 8), (256, 1)] {
             let settings =
                 format!("integrator: Sppm, photons: (direct: {direct}, per_pass: Some(8192))");
             let description = described(SPHERE, &settings, (side, side), passes);
@@ -83,7 +83,7 @@ fn light_through_flat_water_is_the_closed_form() {
     for settings in [
         "integrator: Path",
         "integrator: Path, caustics: Photons, photons: (per_pass: Some(8192))",
-        "integrator: Sppm, photons: (per_pass: Some(65536))",
+        "integrator: Sppm, photons: (per_pass: Some(32768))",
         "integrator: PhotonMap, final_gather: 4, photons: (per_pass: Some(524288))",
     ] {
         let description = described(WATER, settings, (12, 12), 16);
@@ -125,9 +125,9 @@ fn error(pictures: &[Picture], reference: &[f64]) -> f64 {
 }
 
 const METHODS: [&str; 3] = [
-    "integrator: Sppm, photons: (per_pass: Some(8192))",
+    "integrator: Sppm, photons: (per_pass: Some(4096))",
     "integrator: Path, caustics: Photons, photons: (per_pass: Some(2048))",
-    "integrator: PhotonMap, final_gather: 8, photons: (per_pass: Some(30000), nearest: 50)",
+    "integrator: PhotonMap, final_gather: 8, photons: (per_pass: Some(16384), nearest: 50)",
 ];
 
 /// Reference: path tracing with many samples. The progressive methods come nearer to it from pass to
@@ -136,18 +136,18 @@ const METHODS: [&str; 3] = [
 #[test]
 fn all_methods_converge_to_the_same_picture() {
     let text = BALLS.replace("MOTION", "");
-    let reference = described(&text, "integrator: Path", (20, 16), 4096);
+    let reference = described(&text, "integrator: Path", (16, 12), 4096);
     let reference = render_description(&reference, 0).green();
     for method in &METHODS[..2] {
         let at =
-            |samples| error(&seeds(&described(&text, method, (20, 16), samples), 2), &reference);
+            |samples| error(&seeds(&described(&text, method, (16, 12), samples), 2), &reference);
         let errors = [at(4), at(16), at(256)];
         println!("{method}: {errors:?}");
         let slope = (errors[2] / errors[0]).ln() / 64.0_f64.ln();
         assert!(slope < -0.4, "{method}: {errors:?}, slope {slope}");
         assert!(errors[2] < 2e-3, "{method}: {errors:?}");
     }
-    let map = error(&seeds(&described(&text, METHODS[2], (20, 16), 16), 2), &reference);
+    let map = error(&seeds(&described(&text, METHODS[2], (16, 12), 16), 2), &reference);
     println!("{map}");
     assert!(map < 1e-2, "{}: {map}", METHODS[2]);
 }
@@ -157,10 +157,10 @@ fn all_methods_converge_to_the_same_picture() {
 #[test]
 fn a_moving_glass_ball_agrees_with_path_tracing() {
     let text = BALLS.replace("MOTION", ", velocity: (linear: (-12, 0, 0))");
-    let reference = described(&text, "integrator: Path", (20, 16), 2048);
+    let reference = described(&text, "integrator: Path", (16, 12), 2048);
     let reference = render_description(&reference, 0);
     for method in METHODS {
-        let pictures = seeds(&described(&text, method, (20, 16), 64), 4);
+        let pictures = seeds(&described(&text, method, (16, 12), 64), 4);
         let mean = mean_over(&pictures, |_, _| true);
         let expected = reference.mean();
         let difference = mean.mean - expected.mean;
@@ -211,33 +211,53 @@ fn empty_cases_are_ordinary() {
     }
 }
 
-/// Frames of a still camera: where nothing changes, two frames differ by their noise and no more, whose
-/// variance the film states; a ball which moves on the other side does not make the light flicker here.
+/// Mean squared difference of neighbouring frames over the variance which their films state, over the pixels chosen.
+fn flicker(frames: &[Picture], chosen: impl Fn(usize) -> bool) -> f64 {
+    let (mut squares, mut stated) = (0.0, 0.0);
+    for pair in frames.windows(2) {
+        let (a, b) = (pair[0].green(), pair[1].green());
+        let (va, vb) = (pair[0].variance(), pair[1].variance());
+        for k in (0..a.len()).filter(|&k| chosen(k)) {
+            squares += (a[k] - b[k]).powi(2);
+            stated += va[k] + vb[k];
+        }
+    }
+    squares / stated
+}
+
+/// One second of a still camera, 24 frames: where nothing changes, frames differ by their noise and no more, whose
+/// variance the film states; a ball which moves on the other side does not make the light flicker here. With
+/// `PhotonMap` that says something: all samples of a frame read the same photons, whose noise the film
+/// cannot see, so that it must be the same noise in all frames.
 #[test]
-fn frames_differ_by_the_stated_noise_where_nothing_changes() {
+fn a_second_of_frames_differs_by_the_stated_noise_where_nothing_changes() {
+    let methods = [
+        "integrator: Sppm, photons: (per_pass: Some(512))",
+        "integrator: Path, caustics: Photons, photons: (per_pass: Some(256))",
+        "integrator: PhotonMap, final_gather: 4, photons: (per_pass: Some(1536), nearest: 30)",
+        "integrator: PhotonMap, photons: (per_pass: Some(1024), nearest: 30)",
+    ];
+    // The left third, away from the balls' path and shadow, upper half.
+    let left = |k: usize| k % 10 < 3 && k / 10 < 4;
     let moving = BALLS.replace("MOTION", ", velocity: (linear: (-0.5, 0, 0))");
     for text in [BALLS.replace("MOTION", ""), moving] {
-        for method in &METHODS[..2] {
-            let description = described(&text, method, (20, 16), 32);
+        for method in methods {
+            let description = described(&text, method, (10, 8), 16);
             let frames: Vec<Picture> =
-                (0..4).map(|k| render_description(&description, k)).collect();
-            // The left third, away from the balls' path and shadow, upper half.
-            let chosen = |k: usize| k % 20 < 6 && k / 20 < 8;
-            let (mut squares, mut stated) = (0.0, 0.0);
-            for pair in frames.windows(2) {
-                let (a, b) = (pair[0].green(), pair[1].green());
-                let (va, vb) = (pair[0].variance(), pair[1].variance());
-                for k in (0..a.len()).filter(|&k| chosen(k)) {
-                    squares += (a[k] - b[k]).powi(2);
-                    stated += va[k] + vb[k];
-                }
-            }
+                (0..24).map(|k| render_description(&description, k)).collect();
+            assert!(!frames[0].same_bits(&frames[1]), "another frame, another noise");
+            let ratio = flicker(&frames, left);
             // Low-discrepancy points make less noise than their spread tells.
-            let ratio = squares / stated;
             println!("{method}: {ratio}");
             assert!((0.02..1.5).contains(&ratio), "{method}: {ratio} of the stated variance");
         }
     }
+    // What it would be if each frame had photons of its own, as with another seed; with a final gathering the noise of its
+    // rays hides it.
+    let still = described(&BALLS.replace("MOTION", ""), methods[3], (10, 8), 16);
+    let others = flicker(&seeds(&still, 8), left);
+    println!("{others} with other photons");
+    assert!(others > 1.5, "{others}");
 }
 
 /// Oracle: in a closed cavity of albedo ½ and emission ½ the radiance is 1 in every direction, and a glass ball
@@ -252,6 +272,10 @@ fn a_furnace_with_a_glass_ball_reads_one() {
             "cavity": (shape: Sphere(radius: 2), material: "wall", two_sided: true, emission: Radiance((0.5, 0.5, 0.5))),
             "ball": (transform: (translation: (0, -0.1, 0)), shape: Sphere(radius: 0.5), material: "glass"),
         })"#;
+    // The path tracer alone; 20 million paths read 0.99996 ± 0.00005.
+    let mut paths = described(text, "integrator: Path", (64, 64), 64);
+    paths.render.seed = 1;
+    render_description(&paths, 0).mean().assert_agrees("Path", 1.0, 5e-4);
     for settings in [
         METHODS[0],
         METHODS[1],
@@ -292,7 +316,7 @@ fn shading_normals_look_the_same_to_photons() {
     let reference = render_description(&described(&text, "integrator: Path", (16, 12), 1024), 0);
     let photons =
         "integrator: Sppm, photons: (direct: Photons, per_pass: Some(65536), radius: 0.2)";
-    let pictures = seeds(&described(&text, photons, (16, 12), 16), 4);
+    let pictures = seeds(&described(&text, photons, (16, 12), 8), 4);
     let relative = error(&pictures, &reference.green());
     let (mean, expected) = (mean_over(&pictures, |_, _| true), reference.mean());
     println!("{mean:?} {expected:?} {relative}");

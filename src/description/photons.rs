@@ -48,12 +48,20 @@ pub struct PhotonSettings {
     pub alpha: f32,
     /// Radius of the first pass in pixels at the point. Trades blur (bias) for noise.
     pub radius: f32,
+    /// With `Sppm`, photons which suffice in the first pass: where more are found the radius of the pixel begins as small as
+    /// holds so many, down to half a pixel; 0 has all begin alike. Trades noise for blur (bias) of
+    /// bright caustics.
+    pub enough: u32,
     /// Greatest radius of the first pass, as a share of the radius of the scene. Bounds the blur where
     /// pixels are large.
     pub largest_radius: f32,
     /// Photons in an estimate of `PhotonMap`: the radius is that of so many, at most the one above.
     /// Trades noise for blur (bias).
     pub nearest: u32,
+    /// With the final gathering of `PhotonMap` one in so many photons makes a place where the irradiance is
+    /// computed beforehand, for the gathering's rays to take; 0 has each ray look for its own photons. Trades time
+    /// for blur (bias), up to twice that of the radius.
+    pub places: u32,
     /// Weight over the disk.
     pub kernel: Kernel,
     /// How `Sppm` finds light which comes straight from a lamp.
@@ -71,8 +79,10 @@ impl Default for PhotonSettings {
             per_pass: None,
             alpha: 2.0 / 3.0,
             radius: 3.0,
+            enough: 16,
             largest_radius: 0.1,
             nearest: 60,
+            places: 8,
             kernel: Kernel::default(),
             direct: DirectLight::default(),
             min_roughness: 0.4,

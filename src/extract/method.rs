@@ -1,17 +1,21 @@
 //! Which integrator takes a frame, and which paths of it that integrator cannot find.
 
-use super::{Feature, Geometry, Instances, PunctualLights, Requirements};
-use crate::description::{Caustics, IntegratorChoice, Light};
-use crate::math::Aabb;
+use super::caustic_noise::{TextureMeans, caustic_noise};
+use super::{
+    Emissions, Feature, Geometry, Instance, Instances, NOTHING, PunctualLights, Requirements,
+    Surfaces,
+};
+use crate::description::{Caustics, IntegratorChoice, Light, RenderSettings};
+use crate::shape::Primitive;
 use crate::world::Settings;
 use bevy_ecs::prelude::*;
 
-/// A lamp which appears smaller than this share of the scene's cross-section is small: by chance a
-/// path from a diffuse surface over a mirror meets it less than once in a hundred times.
-const SMALL_SHARE: f32 = 0.01;
-/// A distant light is small below this angular diameter, degrees: it fills the same share of the
-/// hemisphere.
-const SMALL_ANGLE_DEG: f32 = 11.5;
+/// From this relative variance of caustics on photons bring them: it is that of all else on a path. The decision
+/// note `auto.md` has the measurements.
+const NOISE_FOR_PHOTONS: f64 = 1.0;
+/// Passes below which what moves looks like under a stroboscope, since all of a pass has one time. Caustics of this
+/// relative variance are not found even by so many paths: then a stroboscope is the lesser evil.
+const PASSES_FOR_MOTION: u32 = 64;
 
 /// The integrators as they are run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -65,60 +69,107 @@ impl ChosenIntegrator {
     }
 }
 
-/// Lights by how hard they are to be met by chance.
-#[derive(Clone, Copy, Debug, Default)]
-struct LightCounts {
-    /// Without any extent.
+/// What decides for `Auto`.
+struct Facts<'a> {
+    settings: &'a RenderSettings,
+    requirements: &'a Requirements,
+    /// Lights without any extent.
     points: usize,
-    /// With an extent, but a small one.
-    small: usize,
     /// Emitting planes, which photons cannot start from.
     planes: usize,
+    /// Relative variance of caustics on a path.
+    noise: f64,
+}
+
+impl Facts<'_> {
+    /// The integrator which suits the scene, and why.
+    fn automatic(&self) -> (Method, String) {
+        let &Self { settings, requirements, points, planes, noise } = self;
+        if !requirements.has(Feature::Caustics) {
+            return (Method::Path, "nothing casts caustics".to_owned());
+        }
+        if points > 0 {
+            let what = if points == 1 { "a point-like light" } else { "point-like lights" };
+            return (Method::PathWithPhotons, format!("paths cannot find the caustics of {what}"));
+        }
+        let compared = format!("{noise:.2} times as noisy as all else");
+        if noise < NOISE_FOR_PHOTONS {
+            return (
+                Method::Path,
+                format!(
+                    "caustics are {compared}, by the sizes of what casts them and of the lamps"
+                ),
+            );
+        }
+        if planes > 0 {
+            return (Method::Path, "photons cannot start from emitting planes".to_owned());
+        }
+        let found_by_paths = noise < f64::from(PASSES_FOR_MOTION);
+        let moving = [Feature::Motion, Feature::CameraMotion, Feature::Deformation];
+        let moves = moving.into_iter().any(|feature| requirements.has(feature));
+        if moves && settings.samples < PASSES_FOR_MOTION && found_by_paths {
+            return (
+                Method::Path,
+                format!(
+                    "with caustics from photons every pass has one time, and {} passes are too few for what moves",
+                    settings.samples
+                ),
+            );
+        }
+        (Method::PathWithPhotons, format!("without photons caustics would be {compared}"))
+    }
 }
 
 /// Writes [`ChosenIntegrator`] when it is different from before.
+#[expect(clippy::too_many_arguments, reason = "the signature lists what the choice depends on")]
 pub fn choose_integrator(
     settings: Res<Settings>,
     requirements: Res<Requirements>,
     instances: Res<Instances>,
     lights: Res<PunctualLights>,
+    emissions: Res<Emissions>,
+    surfaces: Res<Surfaces>,
+    mut means: Local<TextureMeans>,
     mut chosen: ResMut<ChosenIntegrator>,
 ) {
+    if surfaces.is_changed() {
+        means.clear();
+    }
     let settings = &settings.0;
-    let counts = count_lights(&instances, &lights);
+    let (points, planes) = (count_points(&lights), count_planes(&instances));
     let caustics = requirements.has(Feature::Caustics);
-    let hard = counts.points + counts.small;
     let (method, reason) = match (settings.integrator, settings.caustics) {
         (IntegratorChoice::Path, Caustics::Traced) => (Method::Path, None),
         (IntegratorChoice::Path, Caustics::Photons) => (Method::PathWithPhotons, None),
         (IntegratorChoice::PhotonMap, _) => (Method::PhotonMap, None),
         (IntegratorChoice::Sppm, _) => (Method::Sppm, None),
-        (IntegratorChoice::Auto, _) if !caustics => {
-            (Method::Path, Some("nothing casts caustics".to_owned()))
-        }
-        (IntegratorChoice::Auto, _) if hard == 0 => {
-            (Method::Path, Some("all lights are large enough to be met by chance".to_owned()))
-        }
         (IntegratorChoice::Auto, _) => {
-            let lights = if hard == 1 { "light" } else { "lights" };
-            (Method::PathWithPhotons, Some(format!("caustics of {hard} small {lights}")))
+            let min_alpha = settings.photons.min_alpha();
+            let casts = |material| surfaces.materials.may_cast_caustics(material, min_alpha);
+            let noise = if caustics {
+                caustic_noise(&instances, &lights.0, &emissions, &surfaces, &mut means, casts)
+            } else {
+                0.0
+            };
+            let requirements = &requirements;
+            let facts = Facts { settings, requirements, points, planes, noise };
+            let (method, reason) = facts.automatic();
+            (method, Some(reason))
         }
     };
     let mut warnings = Vec::new();
-    if method == Method::Path && caustics && counts.points > 0 {
+    if method == Method::Path && caustics && points > 0 {
         warnings.push(format!(
-            "paths from {} point-like lights over mirrors or through glass are out of reach of \
+            "paths from {points} point-like lights over mirrors or through glass are out of reach of \
              `Path`: their caustics and what stands behind glass stay dark; use `caustics: Photons`, \
-             `Sppm`, or give the light a size",
-            counts.points
+             `Sppm`, or give the light a size"
         ));
     }
-    if method.has_photons() && counts.planes > 0 {
+    if method.has_photons() && planes > 0 {
         warnings.push(format!(
-            "no photons start from {} emitting planes, which have no end: what they light over \
+            "no photons start from {planes} emitting planes, which have no end: what they light over \
              mirrors, through glass or (with `Sppm` and `PhotonMap`) at second hand stays dark; \
-             use `Path`, or rectangles",
-            counts.planes
+             use `Path`, or rectangles"
         ));
     }
     let endless = || instances.list.iter().any(|i| !i.bounds.min.is_finite());
@@ -137,26 +188,94 @@ fn has_far_light(lights: &PunctualLights) -> bool {
     lights.0.iter().any(|l| far(&l.light))
 }
 
-fn count_lights(instances: &Instances, lights: &PunctualLights) -> LightCounts {
-    let mut counts = LightCounts::default();
-    for light in &lights.0 {
-        match light.light {
-            Light::Point { .. } | Light::Spot { .. } | Light::Directional { angle: 0.0, .. } => {
-                counts.points += 1;
-            }
-            Light::Directional { angle, .. } if angle < SMALL_ANGLE_DEG => counts.small += 1,
-            Light::Directional { .. } | Light::Sky { .. } => {}
+/// Lights without any extent.
+fn count_points(lights: &PunctualLights) -> usize {
+    let is_point = |light: &Light<u32>| {
+        matches!(
+            light,
+            Light::Point { .. } | Light::Spot { .. } | Light::Directional { angle: 0.0, .. }
+        )
+    };
+    lights.0.iter().filter(|l| is_point(&l.light)).count()
+}
+
+/// Planes which emit.
+fn count_planes(instances: &Instances) -> usize {
+    let plane = Geometry::Primitive(Primitive::Plane);
+    let emits = |instance: &&Instance| instance.emission != NOTHING && instance.geometry == plane;
+    instances.list.iter().filter(emits).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::{LoadOptions, parse_scene_str};
+    use crate::frame::Simulation;
+
+    /// What `Auto` takes for a ball of glass and a lamp of one metre squared over a floor, all `scale` times as large.
+    fn taken(radius: f32, scale: f32, samples: u32, motion: &str, more: &str) -> Method {
+        let (r, s, h) = (radius * scale, scale, 2.0 * scale);
+        let text = format!(
+            r#"(
+            render: (samples: {samples}),
+            materials: {{"white": Diffuse(albedo: 0.6), "glass": Dielectric(ior: 1.5)}},
+            entities: {{
+                "camera": (transform: (translation: (0, {h}, {h}), look_at: (0, 0, 0)), camera: ()),
+                "floor": (transform: (rotation: (-90, 0, 0)), shape: Rectangle(size: ({h}, {h})), material: "white"),
+                "ball": (transform: (translation: (0, {s}, 0)), shape: Sphere(radius: {r}), material: "glass" {motion}),
+                "lamp": (transform: (translation: (0, {h}, 0), rotation: (90, 0, 0)), shape: Rectangle(size: ({s}, {s})), emission: Radiance((5, 5, 5))),
+                {more}
+            }})"#
+        );
+        let scene = parse_scene_str("auto.ron", &text, None, &LoadOptions::default());
+        let scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+        let mut simulation = Simulation::from_description(&scene);
+        simulation.prepare_frame(0).expect("a camera");
+        simulation.world().resource::<ChosenIntegrator>().method
+    }
+
+    /// Oracle: the boxes of the ball and of the lamp have the areas 24·r² and 2: equal for r = 0.2887.
+    #[test]
+    fn auto_takes_photons_where_what_casts_caustics_is_larger_than_the_lamp() {
+        for scale in [1e-3, 1.0, 1e3] {
+            assert_eq!(taken(0.28, scale, 64, "", ""), Method::Path, "{scale}");
+            assert_eq!(taken(0.3, scale, 64, "", ""), Method::PathWithPhotons, "{scale}");
         }
     }
-    let bounded = || instances.list.iter().filter(|i| i.bounds.min.is_finite());
-    let whole = bounded().fold(Aabb::EMPTY, |whole, i| whole.union(i.bounds));
-    for instance in instances.list.iter().filter(|i| i.emission != super::NOTHING) {
-        let plane = Geometry::Primitive(crate::shape::Primitive::Plane);
-        if instance.geometry == plane {
-            counts.planes += 1;
-        } else if instance.bounds.area() < SMALL_SHARE * whole.area() {
-            counts.small += 1;
-        }
+
+    /// Another lamp.
+    fn second(side: f32, radiance: f32) -> String {
+        format!(
+            r#""second": (transform: (translation: (0.9, 1.9, 0)), shape: Rectangle(size: ({side}, {side})), emission: Radiance(({radiance}, {radiance}, {radiance}))),"#
+        )
     }
-    counts
+
+    /// With a second lamp of area `a` and radiance `L` the sums are `2·5² + 2a·L²` and `2·5 + 2a·L`: what is as bright
+    /// adds to the area, what is dim changes nothing, a bright spark decides.
+    #[test]
+    fn lamps_count_by_what_they_contribute() {
+        for (second, expected) in [
+            (second(0.01, 5.0), Method::Path),
+            (second(0.01, 0.1), Method::Path),
+            // 1.88·(50 + 2e-4·1e10)/(10 + 2e-4·1e5)² = 4200
+            (second(0.01, 1e5), Method::PathWithPhotons),
+        ] {
+            assert_eq!(taken(0.28, 1.0, 64, "", &second), expected, "{second}");
+        }
+        // As large and as bright: half of the noise.
+        assert_eq!(taken(0.3, 1.0, 64, "", &second(1.0, 5.0)), Method::Path);
+    }
+
+    #[test]
+    fn points_planes_and_motion_have_their_own_rules() {
+        let point = r#""bulb": (transform: (translation: (0, 1.9, 0.5)), light: Point(intensity: Some((1, 1, 1)))),"#;
+        assert_eq!(taken(0.1, 1.0, 64, "", point), Method::PathWithPhotons);
+        let plane = r#""glow": (transform: (translation: (0, -1, 0)), shape: Plane(), emission: Radiance((1, 1, 1))),"#;
+        assert_eq!(taken(0.5, 1.0, 64, "", plane), Method::Path);
+        let moving = ", velocity: (linear: (1, 0, 0))";
+        assert_eq!(taken(0.5, 1.0, 63, moving, ""), Method::Path);
+        assert_eq!(taken(0.5, 1.0, 64, moving, ""), Method::PathWithPhotons);
+        assert_eq!(taken(0.5, 1.0, 4, "", ""), Method::PathWithPhotons);
+        assert_eq!(taken(0.5, 1.0, 4, moving, &second(0.01, 1e5)), Method::PathWithPhotons);
+    }
 }

@@ -6,6 +6,7 @@
 //! that a scene may be anywhere.
 
 mod camera;
+mod caustic_noise;
 mod emissions;
 mod instance;
 mod instances;

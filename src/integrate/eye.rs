@@ -25,7 +25,7 @@ use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
 use crate::build::nesting::Meeting;
-use crate::build::photon::{PhotonMap, QueryPoint};
+use crate::build::photon::{IrradianceMap, KnownIrradiance, PhotonMap, QueryPoint, least_radius};
 use crate::description::{DirectLight, PhotonSettings, Rgb};
 use crate::extract::{CameraRay, Method, NOTHING};
 use crate::film::PixelSample;
@@ -34,12 +34,14 @@ use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
 
 /// How much wider photons are gathered at points which the camera sees by a diffuse bounce: the
 /// bounce blurs what is found there anyway.
 const BEHIND_DIFFUSE: f32 = 2.0;
-/// Units in the last place of a position below which a disk cannot be resolved.
-const LEAST_RADIUS_ULPS: f32 = 32.0;
+
+/// Least radius, in pixels, with which a pixel begins: blur which is narrower than the pixel is not seen.
+const SMALLEST_FIRST: f32 = 0.5;
 
 /// The photons of a pass.
 #[derive(Clone, Copy)]
@@ -48,6 +50,8 @@ pub(super) struct Maps<'a> {
     pub global: &'a PhotonMap,
     /// Caustics, where they are kept apart.
     pub caustics: &'a PhotonMap,
+    /// Where the irradiance of `global` is known beforehand.
+    pub irradiance: &'a IrradianceMap,
 }
 
 /// Follows camera paths for the methods with photons.
@@ -87,6 +91,15 @@ impl SampleKey {
     }
 }
 
+/// How large a disk a path begins with.
+#[derive(Clone, Copy)]
+pub(super) struct FirstDisk {
+    /// Factor on the radius of the first pass.
+    pub scale: f32,
+    /// Photons with which the first disk that holds any is content; 0 where it is as large as it is.
+    pub enough: u32,
+}
+
 /// What a pass found for a pixel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathered {
@@ -96,11 +109,22 @@ pub(super) struct Gathered {
     pub radii: (f32, f32),
     /// Disks which could not shrink further.
     pub unresolved: u32,
+    /// Part of the radius with which the pixel was content.
+    pub part: f32,
 }
 
 impl Default for Gathered {
     fn default() -> Self {
-        Self { found: 0, radii: (f32::INFINITY, 0.0), unresolved: 0 }
+        Self { found: 0, radii: (f32::INFINITY, 0.0), unresolved: 0, part: 1.0 }
+    }
+}
+
+impl Gathered {
+    /// Takes note of a disk.
+    fn note(&mut self, radius: f32, unresolved: bool) {
+        let (min, max) = self.radii;
+        self.radii = (min.min(radius), max.max(radius));
+        self.unresolved += u32::from(unresolved);
     }
 }
 
@@ -134,14 +158,15 @@ struct Walk<I> {
     reads: bool,
     /// Whether it only looks for a light.
     last: bool,
+    /// Whether it may still be split in two at a surface of glass.
+    whole: bool,
 }
 
 /// What goes along with all walks of a sample.
 struct Context<'a> {
     key: SampleKey,
     camera_ray: &'a CameraRay,
-    /// Factor on the radius of the first pass.
-    scale: f32,
+    first_disk: FirstDisk,
     counters: &'a mut PathCounters,
     gathered: Gathered,
     sample: PixelSample,
@@ -154,7 +179,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         &self,
         camera_ray: &CameraRay,
         key: SampleKey,
-        scale: f32,
+        first_disk: FirstDisk,
         counters: &mut PathCounters,
     ) -> (PixelSample, Gathered) {
         let walk = Walk {
@@ -170,11 +195,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             length: 0.0,
             reads: false,
             last: false,
+            whole: true,
         };
         let mut context = Context {
             key,
             camera_ray,
-            scale,
+            first_disk,
             counters,
             gathered: Gathered::default(),
             sample: PixelSample { radiance: Rgb::ZERO, first_hit: None },
@@ -302,6 +328,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         if gathers {
             self.final_gathering(walk, &vertex, &receiver, &sides, context);
         }
+        let lobe = self.split(walk, &vertex, (lobe, direction), &sides, sampler, context);
         let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { return false };
         let diffuse = storable && !drawn.delta;
         if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
@@ -321,6 +348,40 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             walk.throughput /= survival;
         }
         true
+    }
+
+    /// Splits the first path which meets glass: the likelier one of mirror image and refracted ray is followed here to its
+    /// end; returns the number which chooses the other for `walk`, whose throughput is now that share.
+    ///
+    /// Either one draws its number from its own share of `[0, 1)`, so that the sum has the mean of a single path,
+    /// whatever is made of the number. A lamp whose image in glass one path in twenty-five would see is seen by all of
+    /// them.
+    fn split(
+        &self,
+        walk: &mut Walk<I>,
+        vertex: &Vertex,
+        (lobe, direction): (f32, Vec2),
+        sides: &Sides<I>,
+        sampler: &Sampler,
+        context: &mut Context,
+    ) -> f32 {
+        if !(walk.whole && walk.since == Since::Never) {
+            return lobe;
+        }
+        let wo = vertex.frame.to_local(vertex.wo);
+        let Some(p) = vertex.bsdf.first_of_two_deltas(wo) else { return lobe };
+        walk.whole = false;
+        let (first, second) = (p * lobe, p + (1.0 - p) * lobe);
+        let ((likely, share), (other, rest)) =
+            if p > 0.5 { ((first, p), (second, 1.0 - p)) } else { ((second, 1.0 - p), (first, p)) };
+        if let Some((wi, drawn)) = vertex.scatter(likely, direction) {
+            let mut branch = *walk;
+            branch.throughput *= share;
+            self.turn(&mut branch, vertex, &vertex.receiver(), (wi, &drawn), false, sides);
+            self.walk(branch, sampler, context);
+        }
+        walk.throughput *= rest;
+        other
     }
 
     /// Whether a path ends where a diffuse lobe would take it on; otherwise `Sppm` and `PhotonMap` send one ray
@@ -392,6 +453,18 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
 
     /// Reads all photons at the end of a ray of a final gathering; `false` if the ray is too short.
     fn read(&self, walk: &Walk<I>, hit: &Hit, vertex: &Vertex, context: &mut Context) -> bool {
+        if let Bsdf::Diffuse(diffuse) = vertex.bsdf
+            && let Some(known) = self.known(walk, vertex)
+        {
+            if hit.t < f64::from(known.radius) {
+                return false;
+            }
+            let unresolved = known.radius <= least_radius(vertex.surface.p.as_vec3());
+            context.gathered.note(known.radius, unresolved);
+            let light = diffuse.albedo * known.irradiance * FRAC_1_PI;
+            context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+            return true;
+        }
         let query = self.query(self.maps.global, walk, vertex, context);
         if hit.t < f64::from(query.radius) {
             return false;
@@ -399,6 +472,18 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let light = self.estimate(self.maps.global, &query, walk, vertex, context);
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
         true
+    }
+
+    /// The irradiance on the side from which the path came, where it is known beforehand and all its photons
+    /// have met no more surfaces than the path may.
+    fn known(&self, walk: &Walk<I>, vertex: &Vertex) -> Option<&KnownIrradiance> {
+        let surface = &vertex.surface;
+        let normal = if vertex.wo.dot(surface.ng) < 0.0 { -surface.ng } else { surface.ng };
+        let position = surface.p.as_vec3();
+        let query = QueryPoint { position, normal, radius: self.largest_radius };
+        let allowed = self.path.max_depth.saturating_sub(walk.depth);
+        let known = self.maps.irradiance.nearest(&query);
+        known.filter(|known| u32::from(known.deepest) < allowed)
     }
 
     /// Sends the rays of a final gathering over the lobes which are not deltas.
@@ -472,28 +557,35 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let surface = &vertex.surface;
         let position = surface.p.as_vec3();
         let nearest = self.method == Method::PhotonMap;
+        let (side, growth) = self.pixel_size;
+        // A pixel is stretched where the surface is seen from the side.
+        let stretch = vertex.wo.dot(surface.ng).abs().sqrt();
+        let footprint = (side + growth * walk.length as f32) / stretch;
         let first = if nearest {
             self.largest_radius
         } else {
-            let (side, growth) = self.pixel_size;
-            // A pixel is stretched where the surface is seen from the side.
-            let stretch = vertex.wo.dot(surface.ng).abs().sqrt();
-            let footprint = (side + growth * walk.length as f32) / stretch;
             let wider = if walk.since == Since::Never { 1.0 } else { BEHIND_DIFFUSE };
             (self.settings.radius * footprint * wider).min(self.largest_radius)
         };
-        let ulp = position.abs().max_element() * f32::EPSILON;
-        let least = LEAST_RADIUS_ULPS * ulp;
-        let mut radius = first * context.scale;
+        let FirstDisk { scale, enough } = context.first_disk;
+        let mut radius = first * scale;
         let mut query = QueryPoint { position, normal: surface.ng, radius };
         if nearest {
             let count = self.settings.nearest as usize;
             radius = map.radius_of(&query, count, &mut context.distances);
+        } else if enough > 0 {
+            // What is smaller than the pixel is not seen.
+            let within = map.radius_of(&query, enough as usize, &mut context.distances);
+            let content = within.max(SMALLEST_FIRST * footprint).min(radius);
+            if !context.distances.is_empty() {
+                context.gathered.part = content / radius;
+                context.first_disk = FirstDisk { scale: scale * content / radius, enough: 0 };
+            }
+            radius = content;
         }
-        context.gathered.unresolved += u32::from(radius < least);
+        let least = least_radius(position);
         query.radius = radius.max(least);
-        let (min, max) = context.gathered.radii;
-        context.gathered.radii = (min.min(query.radius), max.max(query.radius));
+        context.gathered.note(query.radius, radius < least);
         query
     }
 
@@ -535,11 +627,22 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             if !vertex.is_consistent(wi) {
                 return;
             }
-            let f = bsdf_value(&vertex.bsdf, wo_local, vertex.frame.to_local(wi));
-            light += f * photon.power * kernel.weight(distance2, radius2);
+            let weight = kernel.weight(distance2, radius2);
+            match vertex.bsdf {
+                Bsdf::Diffuse(_) if vertex.crosses(wi) => {}
+                // The same for all: it is multiplied by at the end.
+                Bsdf::Diffuse(_) => light += photon.power * weight,
+                _ => {
+                    let f = bsdf_value(&vertex.bsdf, wo_local, vertex.frame.to_local(wi));
+                    light += f * photon.power * weight;
+                }
+            }
         });
         context.gathered.found += found;
-        light
+        match vertex.bsdf {
+            Bsdf::Diffuse(diffuse) => light * diffuse.albedo * FRAC_1_PI,
+            _ => light,
+        }
     }
 }
 

@@ -11,14 +11,15 @@
 //! Every pass is a sample of each pixel (see `radius.rs` for why that is right), so that the film, its
 //! variance and the record of the frame are the same as of any other integrator.
 
-use super::eye::{EyeTracer, Gathered, Maps, SampleKey};
+use super::eye::{EyeTracer, FirstDisk, Gathered, Maps, SampleKey};
 use super::film_pass::{Around, Begin, IntegrateStatus, Job};
 use super::radius::{PixelRadius, shrunk_by_passes};
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
 use crate::build::light::{Aim, PhotonSource};
 use crate::build::photon::{
-    Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
+    IrradianceMap, Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
+    PlaceSettings,
 };
 use crate::description::DirectLight;
 use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
@@ -49,6 +50,7 @@ pub struct PhotonScratch {
     store: PhotonStore,
     global: PhotonMap,
     caustics: PhotonMap,
+    irradiance: IrradianceMap,
     faults: NestingFaults,
 }
 
@@ -279,7 +281,11 @@ impl<'a> Setting<'a> {
 
     fn photon_pass(&self, pass: u32, emitted: u32, time: f32) -> PhotonPass {
         let Job { settings, frame, .. } = self.job;
-        PhotonPass { seed: settings.seed, frame: *frame, pass, emitted, time }
+        // What is read from the same photons over a whole frame has their noise in it, as blotches which no
+        // average over the frame's samples takes out. They stay where they are from frame to frame, and
+        // change only where something does.
+        let frame = if self.method == Method::PhotonMap { 0 } else { *frame };
+        PhotonPass { seed: settings.seed, frame, pass, emitted, time }
     }
 
     /// The time of a pass.
@@ -299,38 +305,49 @@ impl<'a> Setting<'a> {
         report: &mut PhotonReport,
     ) -> Option<()> {
         let cancel = &self.job.control.cancel;
-        let mut faults = scratch.faults;
-        let mut take =
-            |keep: Keep, store: &mut PhotonStore, map: &mut PhotonMap, wanted: Wanted| {
-                let start = Instant::now();
-                let counters: PhotonCounters =
-                    self.tracer::<O, I>(keep).trace_pass(pass, store, cancel)?;
-                let traced = Instant::now();
-                map.rebuild(store, |photon| wanted == Wanted::All || !photon.caustic);
-                report.trace_seconds += (traced - start).as_secs_f64();
-                report.build_seconds += traced.elapsed().as_secs_f64();
-                report.emitted += counters.emitted;
-                faults = faults.plus(counters.nesting);
-                report.stored += counters.stored;
-                self.job.control.rays.fetch_add(counters.rays, Relaxed);
-                Some(map.len() as u64)
-            };
+        let PhotonScratch { store, global, caustics, irradiance, faults } = scratch;
+        let mut take = |keep: Keep, build: &mut dyn FnMut(&PhotonStore)| {
+            let start = Instant::now();
+            let counters: PhotonCounters =
+                self.tracer::<O, I>(keep).trace_pass(pass, store, cancel)?;
+            let traced = Instant::now();
+            build(store);
+            report.trace_seconds += (traced - start).as_secs_f64();
+            report.build_seconds += traced.elapsed().as_secs_f64();
+            report.emitted += counters.emitted;
+            *faults = faults.plus(counters.nesting);
+            report.stored += counters.stored;
+            self.job.control.rays.fetch_add(counters.rays, Relaxed);
+            Some(())
+        };
         if let Some(keep) = self.global_keep() {
             // Without a final gathering the caustics are read from their own map.
-            let direct = self.method == Method::PhotonMap && keep == Keep::Indirect;
-            let wanted = if direct { Wanted::NoCaustics } else { Wanted::All };
-            let stored = take(keep, &mut scratch.store, &mut scratch.global, wanted)?;
-            report.global = report.global.max(stored);
+            let apart = self.method == Method::PhotonMap && keep == Keep::Indirect;
+            take(keep, &mut |store| match self.places() {
+                Some(places) => irradiance.rebuild(store, pass.emitted, global, &places),
+                None => global.rebuild(store, |photon| !(apart && photon.caustic)),
+            })?;
+            report.global = report.global.max(global.len() as u64);
         }
         if self.has_caustic_map() {
-            let stored =
-                take(Keep::Caustics, &mut scratch.store, &mut scratch.caustics, Wanted::All)?;
-            report.caustics = report.caustics.max(stored);
+            take(Keep::Caustics, &mut |store| caustics.rebuild(store, |_| true))?;
+            report.caustics = report.caustics.max(caustics.len() as u64);
         }
-        scratch.faults = faults;
-        let memory = scratch.store.memory() + scratch.global.memory() + scratch.caustics.memory();
+        let memory = store.memory() + global.memory() + caustics.memory() + irradiance.memory();
         report.memory_bytes = report.memory_bytes.max(memory as u64);
         Some(())
+    }
+
+    /// How irradiance is computed beforehand, if it is.
+    fn places(&self) -> Option<PlaceSettings> {
+        let settings = self.job.settings;
+        let gathers = self.method == Method::PhotonMap && settings.final_gather > 0;
+        gathers.then(|| PlaceSettings {
+            one_in: settings.photons.places,
+            nearest: settings.photons.nearest as usize,
+            largest_radius: self.largest_radius(),
+            kernel: settings.photons.kernel,
+        })
     }
 
     /// Renders all passes; `None` when the control cancelled it.
@@ -389,24 +406,26 @@ impl<'a> Setting<'a> {
     ) -> EyeTracer<'b, O, I> {
         let settings = self.job.settings;
         let (side, growth) = self.scene.camera.pixel_size(time);
-        let reach = self.source.reach.map_or(f64::INFINITY, |reach| reach.radius);
         EyeTracer {
             path,
             method: self.method,
             settings: &settings.photons,
             final_gather: settings.final_gather,
-            maps: Maps { global: &scratch.global, caustics: &scratch.caustics },
+            maps: Maps {
+                global: &scratch.global,
+                caustics: &scratch.caustics,
+                irradiance: &scratch.irradiance,
+            },
             pixel_size: (side as f32, growth as f32),
-            largest_radius: settings.photons.largest_radius * reach as f32,
+            largest_radius: self.largest_radius(),
         }
     }
-}
 
-/// Which photons of a store go into a map.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Wanted {
-    All,
-    NoCaustics,
+    /// Greatest radius over which photons are gathered, metres.
+    fn largest_radius(&self) -> f32 {
+        let reach = self.source.reach.map_or(f64::INFINITY, |reach| reach.radius);
+        self.job.settings.photons.largest_radius * reach as f32
+    }
 }
 
 impl TileState {
@@ -453,7 +472,11 @@ impl TileState {
                 Method::PhotonMap => 1.0,
                 Method::Path | Method::PathWithPhotons => by_passes,
             };
-            let (sample, gathered) = tracer.sample(&ray, key, scale, &mut self.counters);
+            let begins = setting.method == Method::Sppm && radius.is_fresh();
+            let enough = if begins { settings.photons.enough } else { 0 };
+            let first_disk = FirstDisk { scale, enough };
+            let (sample, gathered) = tracer.sample(&ray, key, first_disk, &mut self.counters);
+            radius.begin_with(gathered.part);
             radius.absorb(gathered.found, alpha);
             self.gathered.include(&gathered);
             self.buffer.add(x, y, &sample);

@@ -17,6 +17,12 @@
 //! of `1/(π R_i²)`. The radius is kept as a factor on that of the first pass, since a pixel sees
 //! points at several distances.
 //!
+//! Where photons crowd, in the focus of a caustic, the radius of the first pass need not be that of the
+//! pixel: there the first pass that finds photons begins with the disk which holds just *enough* of them
+//! (Hachisuka and Jensen 2009, section 4, leave the first radius open). What it finds there is not biased by that
+//! choice: given the distance of the nearest photon number `k`, the `k − 1` nearer ones are spread evenly over the disk, and
+//! the kernel is 0 at its rim.
+//!
 //! Where a path gathers at several points the radius shrinks by the number of passes alone,
 //! `R_{i+1}² = R_i² (i + α)/(i + 1)` (Knaus and Zwicker 2011, "Progressive Photon Mapping: A
 //! Probabilistic Approach", ACM Trans. Graph. 30(3), eq. 20). Both laws go to zero as `i^((α−1)/2)`.
@@ -40,6 +46,16 @@ impl PixelRadius {
     /// The factor on the radius of the first pass.
     pub fn scale(&self) -> f32 {
         self.scale2.sqrt()
+    }
+
+    /// Whether no pass has found a photon yet.
+    pub fn is_fresh(&self) -> bool {
+        self.kept == 0.0
+    }
+
+    /// Begins with a part of the radius.
+    pub fn begin_with(&mut self, part: f32) {
+        self.scale2 *= part * part;
     }
 
     /// Takes in a pass which found this many photons. One which found none changes nothing.
@@ -100,6 +116,20 @@ mod tests {
         let once = radius;
         radius.absorb(0, 0.7);
         assert_eq!(radius, once);
+    }
+
+    /// A pixel which begins with a third of the radius keeps a third of it in every pass.
+    #[test]
+    fn a_smaller_beginning_scales_all_passes() {
+        let (mut whole, mut third) = (PixelRadius::default(), PixelRadius::default());
+        assert!(third.is_fresh());
+        third.begin_with(1.0 / 3.0);
+        for found in [4, 0, 9, 1] {
+            whole.absorb(found, 0.7);
+            third.absorb(found, 0.7);
+            assert!((3.0 * third.scale() / whole.scale() - 1.0).abs() < 1e-6);
+        }
+        assert!(!third.is_fresh());
     }
 
     /// Oracle: `Γ(N + α)/(Γ(1 + α) Γ(N + 1))`.

@@ -10,11 +10,14 @@
 //!
 //! Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*, chapters 5 to 8.
 
+mod irradiance;
 mod kernel;
 mod map;
 mod record;
 mod trace;
+mod tree;
 
-pub use map::{PhotonMap, QueryPoint};
+pub use irradiance::{IrradianceMap, KnownIrradiance, PlaceSettings};
+pub use map::{PhotonMap, QueryPoint, least_radius};
 pub use record::Photon;
 pub use trace::{Keep, PhotonCounters, PhotonPass, PhotonStore, PhotonTracer};

@@ -40,7 +40,7 @@ impl Photon {
         caustic: bool,
     ) -> Self {
         let direction = octahedral(wi).to_array().map(|x| (x * f32::from(i16::MAX)).round() as i16);
-        let normal = octahedral(normal).to_array().map(|x| (x * f32::from(i8::MAX)).round() as i8);
+        let normal = packed_normal(normal);
         let depth = depth.min(u32::from(u8::MAX)) as u8;
         Self { position, power, direction, normal, depth, caustic }
     }
@@ -54,8 +54,19 @@ impl Photon {
     /// Unit geometric normal of the surface.
     #[inline]
     pub fn normal(&self) -> Vec3 {
-        from_octahedral(Vec2::from(self.normal.map(f32::from)) / f32::from(i8::MAX))
+        unpacked_normal(self.normal)
     }
+}
+
+/// A unit normal in 16 bits.
+pub(super) fn packed_normal(normal: Vec3) -> [i8; 2] {
+    octahedral(normal).to_array().map(|x| (x * f32::from(i8::MAX)).round() as i8)
+}
+
+/// The unit normal of [`packed_normal`].
+#[inline]
+pub(super) fn unpacked_normal(packed: [i8; 2]) -> Vec3 {
+    from_octahedral(Vec2::from(packed.map(f32::from)) / f32::from(i8::MAX))
 }
 
 /// A unit vector as a point of `[−1, 1]²`: the octahedron unfolded.

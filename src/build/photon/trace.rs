@@ -38,7 +38,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
 
 /// Photons which a worker traces in one go.
-const CHUNK: u32 = 1024;
+pub(super) const CHUNK: u32 = 1024;
 /// Stands in the place of the pixel for the random numbers of photons; no picture is that wide.
 const STREAM: u32 = 1 << 31;
 

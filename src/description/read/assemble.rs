@@ -311,8 +311,10 @@ fn check_photons(photons: &PhotonSettings, cursor: &Cursor, report: &mut Report)
         ("per_pass", f64::from(photons.per_pass.unwrap_or(1)), &limits::PHOTONS),
         ("alpha", f64::from(photons.alpha), &limits::ALPHA),
         ("radius", f64::from(photons.radius), &limits::RADIUS),
+        ("enough", f64::from(photons.enough), &limits::ENOUGH),
         ("largest_radius", f64::from(photons.largest_radius), &limits::POSITIVE_SHARE),
         ("nearest", f64::from(photons.nearest), &limits::NEAREST),
+        ("places", f64::from(photons.places), &limits::PLACES),
         ("min_roughness", f64::from(photons.min_roughness), &limits::SHARE),
         ("max_memory", f64::from(photons.max_memory), &limits::MEBIBYTES),
     ];

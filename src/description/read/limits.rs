@@ -104,6 +104,10 @@ pub(super) const POSITIVE_SHARE: Limits =
     Limits { min: 0.0, max: 1.0, open_min: true, open_max: false, unit: "" };
 /// Photons of an estimate.
 pub(super) const NEAREST: Limits = closed(1.0, 1_000_000.0, "photons");
+/// Photons which suffice in the first pass.
+pub(super) const ENOUGH: Limits = closed(0.0, 1_000_000.0, "photons");
+/// Photons for each which makes a place.
+pub(super) const PLACES: Limits = closed(0.0, 1_000_000.0, "photons");
 /// Memory for photons.
 pub(super) const MEBIBYTES: Limits = closed(1.0, 1e9, "MiB");
 /// Exposure.

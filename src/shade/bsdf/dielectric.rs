@@ -13,6 +13,17 @@ pub struct SmoothDielectric {
 }
 
 impl SmoothDielectric {
+    /// Share of the light from `wo` that is reflected.
+    #[inline]
+    #[expect(clippy::float_cmp, reason = "1 exactly means that there is no interface")]
+    pub(super) fn reflectance(self, wo: Vec3) -> f32 {
+        if self.eta == 1.0 {
+            return 0.0;
+        }
+        let eta = if wo.z > 0.0 { self.eta } else { 1.0 / self.eta };
+        fresnel::dielectric(wo.z.abs(), wo.x * wo.x + wo.y * wo.y, eta).reflectance
+    }
+
     #[inline]
     #[expect(clippy::float_cmp, reason = "1 exactly means that there is no interface")]
     pub(super) fn sample(self, wo: Vec3, u_lobe: f32, mode: TransportMode) -> Option<BsdfSample> {

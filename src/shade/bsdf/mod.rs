@@ -189,6 +189,18 @@ impl Bsdf<'_> {
         }
     }
 
+    /// The probability with which [`Bsdf::sample`] takes the first of two deltas, those with `u_lobe` below
+    /// it; `None` where there are not just two.
+    #[inline]
+    pub fn first_of_two_deltas(&self, wo: Vec3) -> Option<f32> {
+        let p = match self {
+            Self::SmoothDielectric(bsdf) => bsdf.reflectance(wo),
+            Self::ThinGlass(bsdf) => bsdf.reflection_probability(wo),
+            _ => return None,
+        };
+        (p > 0.0 && p < 1.0).then_some(p)
+    }
+
     /// Evaluates all lobes which are not deltas for a pair of directions.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, mode: TransportMode) -> BsdfValue {

@@ -531,3 +531,32 @@ fn diffuse_is_lambertian_on_both_sides() {
         assert_eq!(behind, BsdfValue::ZERO);
     }
 }
+
+/// The number that chooses a lobe chooses the mirror image below the probability that is told, and the other ray from
+/// there on; where there are not two deltas nothing is told.
+#[test]
+fn the_share_of_the_mirror_image_is_the_one_that_is_drawn_by() {
+    use crate::sampling::{Sampler, warp::uniform_sphere};
+    for k in 0..2000 {
+        let s = Sampler::new(21, 0, (0, 0), k);
+        let wo = uniform_sphere(s.two(0));
+        let eta = 0.6 + 1.4 * s.one(2);
+        for bsdf in [
+            Bsdf::SmoothDielectric(SmoothDielectric { eta }),
+            Bsdf::ThinGlass(ThinGlass { eta, tint: Rgb::new(0.9, 0.5, 0.2) }),
+        ] {
+            let Some(p) = bsdf.first_of_two_deltas(wo) else {
+                let total = bsdf.sample(wo, 0.999_999, Vec2::ZERO, TransportMode::Radiance);
+                assert!(total.is_none_or(|total| !total.transmitted), "{bsdf:?}, {wo}");
+                continue;
+            };
+            for u in [0.0, p * 0.5, p * 0.999, p * 1.001, 0.5 * (1.0 + p)] {
+                let drawn = bsdf.sample(wo, u, Vec2::ZERO, TransportMode::Radiance);
+                let drawn = drawn.expect("either has energy");
+                assert_eq!(drawn.transmitted, u >= p, "{bsdf:?}, {wo}, {u} of {p}");
+            }
+        }
+    }
+    let diffuse = Bsdf::Diffuse(Diffuse { albedo: Rgb::ONE });
+    assert_eq!(diffuse.first_of_two_deltas(Vec3::Z), None);
+}

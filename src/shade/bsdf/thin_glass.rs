@@ -38,6 +38,13 @@ impl ThinGlass {
         }
     }
 
+    /// The probability with which [`Self::sample`] reflects.
+    pub(super) fn reflection_probability(&self, wo: Vec3) -> f32 {
+        let (reflectance, transmittance) = self.shares(wo.z.abs(), wo.x * wo.x + wo.y * wo.y);
+        let (r, t) = (mean(reflectance), mean(transmittance));
+        r / (r + t)
+    }
+
     pub(super) fn albedo(&self, mu: f32) -> Rgb {
         let (r, t) = self.shares(mu, ((1.0 - mu) * (1.0 + mu)).max(0.0));
         r + t
