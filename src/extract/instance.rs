@@ -57,6 +57,12 @@ pub(super) struct Placed {
 }
 
 impl Instance {
+    /// A box around `bounds`, in the space of a geometry, carried through `keys` and between them.
+    #[cfg(test)]
+    pub(crate) fn bounds_of(bounds: &Aabb, keys: &[DAffine3], motion: &MotionTransform) -> Aabb {
+        shutter_bounds(bounds, keys, motion)
+    }
+
     /// Sees an object at rest from another origin; gives the same bits as [`placed`] does. What moves in
     /// the shutter is left as it is.
     pub(super) fn follow(&mut self, place: &Place, origin: DVec3) {

@@ -1,6 +1,8 @@
 //! What rays meet: the objects of a frame and their trees.
 
-use super::top::{Joined, RESTING};
+use super::spheres::LANES;
+use super::top::{Joined, Leaf};
+use super::wide::sphere_hits;
 use super::{MeshTree, TopLevel};
 use crate::extract::{Geometry, Instance};
 use crate::math::{MotionTransform, Ray};
@@ -29,6 +31,29 @@ impl Hit {
     }
 }
 
+/// The nearest hit so far.
+#[derive(Default)]
+struct Nearest(Option<Hit>);
+
+impl Nearest {
+    #[inline]
+    fn offer(&mut self, hit: Option<Hit>) {
+        if let Some(hit) = hit
+            && self.0.is_none_or(|best| hit.precedes(&best))
+        {
+            self.0 = Some(hit);
+        }
+    }
+
+    /// A hit of a sphere, or infinity.
+    #[inline(always)]
+    fn offer_sphere(&mut self, t: f64, instance: u32) {
+        if t < f64::INFINITY {
+            self.offer(Some(Hit { t, instance, primitive: 0, weights: DVec2::ZERO }));
+        }
+    }
+}
+
 /// Everything that a ray can meet.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneGeometry<'a> {
@@ -44,43 +69,53 @@ impl SceneGeometry<'_> {
     /// The nearest hit with `0 < t < t_max`. A camera ray passes through what is hidden from the
     /// camera.
     pub fn closest_hit(&self, ray: &Ray, t_max: f64, from_camera: bool) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        let mut visit = |index: u32, t_max: f64| {
+        let (whole, mut nearest) = (whole(ray), Nearest::default());
+        let visit = |name: u32, t_max: f64| {
             // Equal distances are let through, so that the tie is decided by `precedes`.
             let end = t_max.next_up();
-            let hit = if let (RESTING, Some(joined)) = (index, &self.top.joined) {
-                hit_joined(joined, ray, end)
-            } else {
-                let instance = &self.instances[index as usize];
-                if from_camera && instance.hidden_from_camera {
-                    return t_max;
+            match (Leaf::of(name), &self.top.joined) {
+                (Leaf::Spheres(block), _) => {
+                    let block = &self.top.spheres[block];
+                    let t = sphere_hits(block, &whole, end);
+                    for lane in 0..LANES {
+                        nearest.offer_sphere(t[lane], block.instances[lane]);
+                    }
                 }
-                self.hit_instance(index, instance, ray, end)
-            };
-            if let Some(hit) = hit
-                && best.is_none_or(|best| hit.precedes(&best))
-            {
-                best = Some(hit);
+                (Leaf::Resting, Some(joined)) => nearest.offer(hit_joined(joined, ray, end)),
+                (Leaf::Resting, None) => {}
+                (Leaf::One(index), _) => {
+                    let instance = &self.instances[index as usize];
+                    if !(from_camera && instance.hidden_from_camera) {
+                        nearest.offer(self.hit_instance(index, instance, ray, end));
+                    }
+                }
             }
-            best.map_or(t_max, |best| best.t)
+            nearest.0.map_or(t_max, |best| best.t)
         };
+        let mut visit = visit;
         // Strictly before the end of the ray.
         let mut limit = t_max.next_down();
         for &index in &self.top.always {
             limit = visit(index, limit);
         }
-        self.top.tree.traverse(&whole(ray), limit, visit);
-        best
+        self.top.tree.traverse(&whole, limit, visit);
+        nearest.0
     }
 
     /// Whether anything lies at `0 < t < t_max`.
     pub fn occluded(&self, ray: &Ray, t_max: f64) -> bool {
-        let mut blocked = false;
-        let mut visit = |index: u32, t_max: f64| {
-            blocked = if let (RESTING, Some(joined)) = (index, &self.top.joined) {
-                joined.tree.any_hit(&shifted(ray, joined), ray.time, t_max)
-            } else {
-                self.blocks(&self.instances[index as usize], ray, t_max)
+        let (whole, mut blocked) = (whole(ray), false);
+        let mut visit = |name: u32, t_max: f64| {
+            blocked = match (Leaf::of(name), &self.top.joined) {
+                (Leaf::Spheres(block), _) => {
+                    let t = sphere_hits(&self.top.spheres[block], &whole, t_max);
+                    t.iter().any(|t| *t < f64::INFINITY)
+                }
+                (Leaf::Resting, Some(joined)) => {
+                    joined.tree.any_hit(&shifted(ray, joined), ray.time, t_max)
+                }
+                (Leaf::Resting, None) => false,
+                (Leaf::One(index), _) => self.blocks(&self.instances[index as usize], ray, t_max),
             };
             if blocked { 0.0 } else { t_max }
         };
@@ -89,7 +124,7 @@ impl SceneGeometry<'_> {
                 return true;
             }
         }
-        self.top.tree.traverse(&whole(ray), t_max, visit);
+        self.top.tree.traverse(&whole, t_max, visit);
         blocked
     }
 

@@ -9,7 +9,10 @@
 mod geometry;
 mod mesh_tree;
 mod resting;
+mod spheres;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod top;
 mod tree;
 mod wide;

@@ -1,6 +1,7 @@
 //! The tree over the objects of a frame.
 
 use super::resting::RestingTree;
+use super::spheres::{LANES, SphereBlock, joinable};
 use super::wide::BoxTree;
 use super::{Bvh, MeshTree};
 use crate::extract::{FrameOrigin, Instance, Instances, NOTHING};
@@ -9,10 +10,40 @@ use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
+/// Cost of the share of a node which divides two leaves, in tests of a block of spheres.
+const DIVIDING: f32 = 0.35;
 /// With so few objects each is asked in turn, which costs less than a tree over them.
 const FEW: usize = 3;
 /// Stands among the objects for all meshes of the [`RestingTree`].
 pub(super) const RESTING: u32 = u32::MAX;
+
+/// What a leaf of the tree holds.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Leaf {
+    /// An instance.
+    One(u32),
+    /// The meshes of the [`RestingTree`].
+    Resting,
+    /// A block of spheres.
+    Spheres(usize),
+}
+
+impl Leaf {
+    /// Set in the names of blocks.
+    const SPHERES: u32 = 1 << 31;
+
+    /// What a name stands for.
+    #[inline]
+    pub(super) fn of(name: u32) -> Self {
+        if name & Self::SPHERES == 0 {
+            Self::One(name)
+        } else if name == RESTING {
+            Self::Resting
+        } else {
+            Self::Spheres((name & !Self::SPHERES) as usize)
+        }
+    }
+}
 
 /// The resting meshes as the top level holds them.
 #[derive(Clone, Debug)]
@@ -41,6 +72,42 @@ impl Joined {
     }
 }
 
+/// Spheres on their way into blocks.
+struct Spheres {
+    blocks: Vec<SphereBlock>,
+    /// For each instance its lane, or [`NOTHING`].
+    lanes: Vec<u32>,
+}
+
+impl Spheres {
+    /// Puts the spheres of small subtrees into blocks, and names their leaves.
+    fn gather(&mut self, binary: &mut Bvh, names: &mut [u32], instances: &[Instance]) {
+        let sphere = |name: u32| instances.get(name as usize).and_then(joinable);
+        binary.share_leaves(LANES as u32, DIVIDING, |item| sphere(names[item as usize]).is_some());
+        let mut free = 0;
+        for items in binary.leaves() {
+            if sphere(names[items[0] as usize]).is_none() {
+                continue;
+            }
+            if free < items.len() {
+                self.blocks.push(SphereBlock::EMPTY);
+                free = LANES;
+            }
+            let block = self.blocks.len() - 1;
+            for &item in items {
+                let index = names[item as usize];
+                if let Some(numbers) = sphere(index) {
+                    let lane = LANES - free;
+                    free -= 1;
+                    self.blocks[block].set(lane, index, numbers);
+                    self.lanes[index as usize] = (block * LANES + lane) as u32;
+                }
+            }
+            names[items[0] as usize] = Leaf::SPHERES | block as u32;
+        }
+    }
+}
+
 /// The tree over the objects of a frame. Planes have no bounds and are kept beside it.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct TopLevel {
@@ -50,6 +117,10 @@ pub struct TopLevel {
     pub(super) joined: Option<Joined>,
     /// For each instance its box in the tree, or [`NOTHING`].
     boxes: Vec<u32>,
+    /// Spheres at rest, in the order of the leaves which hold them.
+    pub(super) spheres: Vec<SphereBlock>,
+    /// For each instance its lane, counted over all blocks, or [`NOTHING`].
+    lanes: Vec<u32>,
     bounds: Aabb,
     /// Whether it was built anew in this frame.
     pub built: bool,
@@ -88,19 +159,28 @@ impl TopLevel {
             objects.push((RESTING, joined.bounds()));
         }
         let bounds = objects.iter().fold(Aabb::EMPTY, |sum, (_, b)| sum.union(*b));
+        let mut spheres = Spheres { blocks: Vec::new(), lanes: vec![NOTHING; instances.len()] };
         let tree = if objects.len() <= FEW {
             // The resting meshes first: most of what is hit is there, and a near hit saves work.
             always.extend(objects.iter().rev().map(|(index, _)| *index));
             BoxTree::default()
         } else {
-            let (names, boxes): (Vec<u32>, Vec<Aabb>) = objects.into_iter().unzip();
-            BoxTree::collapse(&Bvh::build(&boxes, 1), &boxes, &names)
+            let (mut names, boxes): (Vec<u32>, Vec<Aabb>) = objects.into_iter().unzip();
+            let mut binary = Bvh::build(&boxes, 1);
+            spheres.gather(&mut binary, &mut names, instances);
+            BoxTree::collapse(&binary, &boxes, &names)
         };
-        Self { tree, always, joined, boxes, bounds, built: true, refitted: 0 }
+        let Spheres { blocks: spheres, lanes } = spheres;
+        Self { tree, always, joined, boxes, spheres, lanes, bounds, built: true, refitted: 0 }
     }
 
     /// Puts some objects elsewhere; false when the tree should rather be built anew.
-    fn refit(&mut self, instances: &[Instance], moved: &[u32], origin: &FrameOrigin) -> bool {
+    pub(super) fn refit(
+        &mut self,
+        instances: &[Instance],
+        moved: &[u32],
+        origin: &FrameOrigin,
+    ) -> bool {
         if self.tree.is_empty() {
             // There is next to nothing to build.
             return false;
@@ -112,7 +192,8 @@ impl TopLevel {
                 return false;
             }
             if place != NOTHING {
-                self.tree.refit(place as usize, &instance.bounds);
+                let Some(bounds) = self.follow(index, instances) else { return false };
+                self.tree.refit(place as usize, &bounds);
             }
         }
         if let Some(joined) = &mut self.joined {
@@ -125,9 +206,30 @@ impl TopLevel {
         !self.tree.is_worn()
     }
 
+    /// The box of the leaf of an instance which was put elsewhere; `None` when it cannot stay in its
+    /// block.
+    fn follow(&mut self, index: u32, instances: &[Instance]) -> Option<Aabb> {
+        let instance = &instances[index as usize];
+        let lane = self.lanes[index as usize];
+        if lane == NOTHING {
+            return Some(instance.bounds);
+        }
+        let (block, lane) = (lane as usize / LANES, lane as usize % LANES);
+        self.spheres[block].set(lane, index, joinable(instance)?);
+        let place = self.boxes[index as usize];
+        // The others of its leaf are others of its block.
+        let members = self.spheres[block].instances.into_iter().filter(|index| *index != NOTHING);
+        let members =
+            members.filter(|&k| self.tree.share(self.boxes[k as usize] as usize, place as usize));
+        Some(members.map(|k| instances[k as usize].bounds).fold(Aabb::EMPTY, Aabb::union))
+    }
+
     /// Bytes held, without the tree of resting meshes.
     pub fn memory(&self) -> usize {
-        self.tree.memory() + (self.always.capacity() + self.boxes.capacity()) * size_of::<u32>()
+        let tables = self.always.capacity() + self.boxes.capacity() + self.lanes.capacity();
+        self.tree.memory()
+            + self.spheres.capacity() * size_of::<SphereBlock>()
+            + tables * size_of::<u32>()
     }
 
     /// The box around all instances which have bounds.
