@@ -15,13 +15,13 @@ use kinora::math::Ray;
 use kinora::world::{Shape, Transform};
 
 /// Which rays through a geometry are counted: those which hit anything, nearest or whichever.
-type Way = fn(&SceneGeometry, &Ray) -> bool;
+pub type Way = fn(&SceneGeometry, &Ray) -> bool;
 
-fn closest(geometry: &SceneGeometry, ray: &Ray) -> bool {
+pub fn closest(geometry: &SceneGeometry, ray: &Ray) -> bool {
     geometry.closest_hit(ray, f64::INFINITY, true).is_some()
 }
 
-fn any(geometry: &SceneGeometry, ray: &Ray) -> bool {
+pub fn any(geometry: &SceneGeometry, ray: &Ray) -> bool {
     geometry.occluded(ray, f64::INFINITY)
 }
 

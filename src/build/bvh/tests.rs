@@ -1,8 +1,9 @@
 //! The nearest hit among many objects, against asking each of them.
 
+use super::movers::{Mover, Movers, mover};
 use super::{SceneGeometry, TopLevel};
 use crate::extract::{FrameOrigin, Geometry, Instance, NOTHING};
-use crate::math::{MotionTransform, Ray};
+use crate::math::{MotionTransform, Ray, swept_bounds};
 use crate::sampling::Sampler;
 use crate::shape::{LocalRay, Primitive};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
@@ -16,7 +17,7 @@ fn three(seed: u64, number: u32) -> Vec3 {
 /// A shape which goes through `keys`.
 fn object(primitive: Primitive, keys: &[DAffine3], hidden: bool) -> Instance {
     let motion = MotionTransform::new(keys);
-    let bounds = Instance::bounds_of(&primitive.bounds(), keys, &motion);
+    let bounds = swept_bounds(&primitive.bounds(), &motion, 0.0, 1.0);
     Instance {
         geometry: Geometry::Primitive(primitive),
         motion,
@@ -113,10 +114,81 @@ fn spheres_in_blocks_are_found_before_and_after_they_moved() {
         let keys = [placed(index + 1000, 0.05, 0.0)];
         instances[index as usize] = object(Primitive::Sphere, &keys, false);
     }
-    top.refit(&instances, &moved, &FrameOrigin::default());
+    top.refit(&instances, &[], &moved, &FrameOrigin::default());
     assert!(assert_each_is_found(&instances, &top, &times, 2000) > 500);
     // One which turns cannot stay in its block.
     let last = moved[moved.len() - 1];
     instances[last as usize] = object(Primitive::Sphere, &[placed(last, 0.05, 1.0)], false);
-    assert!(!top.refit(&instances, &[last], &FrameOrigin::default()), "it is built anew");
+    assert!(!top.refit(&instances, &[], &[last], &FrameOrigin::default()), "it is built anew");
+}
+
+/// Shapes which go far: along lines, through keys, turning, and as camera rays do not see.
+fn swarm(count: u32) -> Vec<Instance> {
+    (0..count)
+        .map(|k| {
+            let size = 0.02 * f64::from(1 + k % 3);
+            let turn = if k % 3 == 0 { 0.0 } else { 1.5 };
+            let keys: Vec<DAffine3> = (0..2 + k % 4)
+                .map(|key| placed(1000 * key + k, size, turn * f64::from(key)))
+                .collect();
+            let primitive = if k % 2 == 0 { Primitive::Sphere } else { Primitive::Cuboid };
+            object(primitive, &keys, k % 11 == 5)
+        })
+        .collect()
+}
+
+/// Oracle: each instance by itself, at random times, both ends of the shutter and all borders of segments
+/// with the numbers next to them; for any number of segments, next to what is at rest and moves little.
+#[test]
+fn what_moves_far_is_found_in_any_number_of_segments() {
+    let mut instances = swarm(150);
+    instances.extend(crowd(50));
+    let mut times: Vec<f32> = (0..37).map(|k| Sampler::new(60, 0, (k, 0), 0).one(0)).collect();
+    for border in 0..=64 {
+        let time = f32::from(border as u8) / 64.0;
+        times.extend([time, time.next_up().min(1.0), time.next_down().max(0.0)]);
+    }
+    let mut top = TopLevel::build(&instances);
+    assert!(top.segments() > 4, "{} segments", top.segments());
+    let far: Vec<Mover> =
+        (0..).zip(&instances).filter_map(|(k, instance)| mover(k, instance, &[])).collect();
+    assert!(far.len() > 100);
+    for segments in [1, 2, 8, 64] {
+        top.movers = Movers::with_segments(&far, &instances, segments);
+        assert!(assert_each_is_found(&instances, &top, &times, 1000) > 100);
+    }
+}
+
+/// What moves far goes on elsewhere, and comes to rest.
+#[test]
+fn what_moves_far_is_followed() {
+    let mut instances = swarm(40);
+    instances.extend(crowd(50));
+    let mut top = TopLevel::build(&instances);
+    let all: Vec<u32> = (0..instances.len() as u32).collect();
+    let shift = DAffine3::from_translation(DVec3::new(0.3, -0.2, 0.1));
+    let keys = [placed(3, 0.05, 0.0), shift * placed(9, 0.05, 0.0)];
+    instances[3] = object(Primitive::Sphere, &keys, false);
+    assert!(top.refit(&instances, &[], &all, &FrameOrigin::default()));
+    assert!(assert_each_is_found(&instances, &top, &[0.0, 0.4, 1.0], 1000) > 100);
+    instances[3] = object(Primitive::Sphere, &keys[..1], false);
+    assert!(!top.refit(&instances, &[], &[3], &FrameOrigin::default()), "it is built anew");
+}
+
+/// Slow motion is not worth a tree of its own; the faster, the more segments.
+#[test]
+fn segments_follow_from_the_motion() {
+    let segments = |radii: f64| {
+        let ball = |k| {
+            let start = placed(k, 0.02, 0.0);
+            let way = three(70, k).as_dvec3().normalize() * 0.02 * radii;
+            object(Primitive::Sphere, &[start, DAffine3::from_translation(way) * start], false)
+        };
+        let instances: Vec<Instance> = (0..100).map(ball).collect();
+        TopLevel::build(&instances).segments()
+    };
+    let numbers = [0.5, 1.0, 8.0, 50.0, 1e4].map(segments);
+    assert_eq!(numbers[..2], [1, 1], "a ball which moves by its radius");
+    assert!(numbers.is_sorted() && numbers[2] > 1 && numbers[3] > numbers[2], "{numbers:?}");
+    assert_eq!(numbers[4], 64, "as many as there may be");
 }

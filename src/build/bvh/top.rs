@@ -1,10 +1,11 @@
 //! The tree over the objects of a frame.
 
+use super::movers::{Mover, Movers, mover};
 use super::resting::RestingTree;
 use super::spheres::{LANES, SphereBlock, joinable};
 use super::wide::BoxTree;
 use super::{Bvh, MeshTree};
-use crate::extract::{FrameOrigin, Instance, Instances, NOTHING};
+use crate::extract::{FrameOrigin, Instance, Instances, Meshes, NOTHING};
 use crate::math::Aabb;
 use bevy_ecs::prelude::*;
 use glam::{DAffine3, DVec3};
@@ -16,6 +17,8 @@ const DIVIDING: f32 = 0.35;
 const FEW: usize = 3;
 /// Stands among the objects for all meshes of the [`RestingTree`].
 pub(super) const RESTING: u32 = u32::MAX;
+/// Stands among the objects for all which move far.
+const MOVING: u32 = u32::MAX - 1;
 
 /// What a leaf of the tree holds.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +27,8 @@ pub(super) enum Leaf {
     One(u32),
     /// The meshes of the [`RestingTree`].
     Resting,
+    /// All objects which move far.
+    Moving,
     /// A block of spheres.
     Spheres(usize),
 }
@@ -39,6 +44,8 @@ impl Leaf {
             Self::One(name)
         } else if name == RESTING {
             Self::Resting
+        } else if name == MOVING {
+            Self::Moving
         } else {
             Self::Spheres((name & !Self::SPHERES) as usize)
         }
@@ -70,6 +77,12 @@ impl Joined {
     fn bounds(&self) -> Aabb {
         self.tree.bounds().transformed(&DAffine3::from_translation(self.shift))
     }
+}
+
+/// The objects which move far, ascending.
+fn far_movers(instances: &[Instance], mesh_bounds: &[Aabb]) -> Vec<Mover> {
+    let numbered = (0..).zip(instances);
+    numbered.filter_map(|(index, instance)| mover(index, instance, mesh_bounds)).collect()
 }
 
 /// Spheres on their way into blocks.
@@ -115,6 +128,9 @@ pub struct TopLevel {
     /// What is asked without a tree.
     pub(super) always: Vec<u32>,
     pub(super) joined: Option<Joined>,
+    pub(super) movers: Option<Movers>,
+    /// Whether anything moves within the shutter other than by changing its form.
+    pub(super) moves: bool,
     /// For each instance its box in the tree, or [`NOTHING`].
     boxes: Vec<u32>,
     /// Spheres at rest, in the order of the leaves which hold them.
@@ -131,21 +147,41 @@ pub struct TopLevel {
 impl TopLevel {
     /// Builds the tree over `instances`.
     pub fn build(instances: &[Instance]) -> Self {
-        Self::with_resting(instances, &RestingTree::default(), &FrameOrigin::default())
+        Self::with_resting(instances, &[], &RestingTree::default(), &FrameOrigin::default())
     }
 
-    /// Builds the tree over `instances` and the tree of resting meshes.
+    /// Builds the tree over `instances` with boxes around their ways during the whole shutter, as the
+    /// bench does to see what segments are worth.
+    pub fn without_segments(instances: &[Instance]) -> Self {
+        Self::assemble(instances, &[], &RestingTree::default(), &FrameOrigin::default())
+    }
+
+    /// Builds the tree over `instances` and the tree of resting meshes; `mesh_bounds` are the boxes of the
+    /// meshes during the whole shutter.
     pub fn with_resting(
         instances: &[Instance],
+        mesh_bounds: &[Aabb],
+        resting: &RestingTree,
+        origin: &FrameOrigin,
+    ) -> Self {
+        Self::assemble(instances, &far_movers(instances, mesh_bounds), resting, origin)
+    }
+
+    /// The same with these objects in trees by segments.
+    fn assemble(
+        instances: &[Instance],
+        far: &[Mover],
         resting: &RestingTree,
         origin: &FrameOrigin,
     ) -> Self {
         let joined = Joined::new(resting, origin);
+        let movers = Movers::build(far, instances);
+        let mut far = far.iter().map(|(index, _)| *index).peekable();
         let mut objects: Vec<(u32, Aabb)> = Vec::with_capacity(instances.len() + 1);
         let mut always = Vec::new();
         let mut boxes = vec![NOTHING; instances.len()];
         for (index, instance) in (0..).zip(instances) {
-            if resting.first_triangle(index).is_some() {
+            if far.next_if_eq(&index).is_some() || resting.first_triangle(index).is_some() {
                 continue;
             }
             if instance.bounds.min.is_finite() {
@@ -154,6 +190,9 @@ impl TopLevel {
             } else {
                 always.push(index);
             }
+        }
+        if let Some(movers) = &movers {
+            objects.push((MOVING, movers.bounds));
         }
         if let Some(joined) = &joined {
             objects.push((RESTING, joined.bounds()));
@@ -171,13 +210,27 @@ impl TopLevel {
             BoxTree::collapse(&binary, &boxes, &names)
         };
         let Spheres { blocks: spheres, lanes } = spheres;
-        Self { tree, always, joined, boxes, spheres, lanes, bounds, built: true, refitted: 0 }
+        let moves = instances.iter().any(|instance| !instance.motion.is_static());
+        Self {
+            tree,
+            always,
+            joined,
+            movers,
+            moves,
+            boxes,
+            spheres,
+            lanes,
+            bounds,
+            built: true,
+            refitted: 0,
+        }
     }
 
     /// Puts some objects elsewhere; false when the tree should rather be built anew.
     pub(super) fn refit(
         &mut self,
         instances: &[Instance],
+        mesh_bounds: &[Aabb],
         moved: &[u32],
         origin: &FrameOrigin,
     ) -> bool {
@@ -185,7 +238,28 @@ impl TopLevel {
             // There is next to nothing to build.
             return false;
         }
+        let moving = |index: &u32| !instances[*index as usize].motion.is_static();
+        // What moved in the last frame may do so again without having been written.
+        let moves = self.moves || moved.iter().any(moving);
+        let far = if moves { far_movers(instances, mesh_bounds) } else { Vec::new() };
+        if !self.movers.as_ref().map_or(far.is_empty(), |movers| movers.are(&far)) {
+            return false;
+        }
+        let mut last = self.tree.len();
+        if self.joined.is_some() {
+            last -= 1;
+        }
+        if let Some(movers) = Movers::build(&far, instances) {
+            self.tree.refit(last - 1, &movers.bounds);
+            self.movers = Some(movers);
+        }
+        self.moves = moves && instances.iter().any(|instance| !instance.motion.is_static());
+        let mut far = far.iter().map(|(index, _)| *index).peekable();
         for &index in moved {
+            while far.next_if(|far| *far < index).is_some() {}
+            if far.next_if_eq(&index).is_some() {
+                continue;
+            }
             let instance = &instances[index as usize];
             let place = self.boxes[index as usize];
             if instance.bounds.min.is_finite() != (place != NOTHING) {
@@ -228,8 +302,20 @@ impl TopLevel {
     pub fn memory(&self) -> usize {
         let tables = self.always.capacity() + self.boxes.capacity() + self.lanes.capacity();
         self.tree.memory()
+            + self.movers.as_ref().map_or(0, Movers::memory)
             + self.spheres.capacity() * size_of::<SphereBlock>()
             + tables * size_of::<u32>()
+    }
+
+    /// In how many segments of the shutter what moves far is bounded; 1 when nothing is.
+    pub fn segments(&self) -> usize {
+        self.movers.as_ref().map_or(1, Movers::segments)
+    }
+
+    /// Has rays take the code for a scene in which something moves, as the bench does to see what it
+    /// costs where nothing does.
+    pub fn assume_motion(&mut self) {
+        self.moves = true;
     }
 
     /// The box around all instances which have bounds.
@@ -244,6 +330,7 @@ impl TopLevel {
 /// What a ray hits does not depend on the shape of the tree, so that a frame is the same in either case.
 pub fn rebuild_top_level(
     instances: Res<Instances>,
+    meshes: Res<Meshes>,
     resting: Res<RestingTree>,
     origin: Res<FrameOrigin>,
     mut top: ResMut<TopLevel>,
@@ -259,7 +346,7 @@ pub fn rebuild_top_level(
     let top = &mut *top;
     let same = !(instances.is_added() || instances.restructured || resting.is_changed());
     top.built = false;
-    if !(same && top.refit(&instances.list, &instances.rewritten_slots, &origin)) {
-        *top = TopLevel::with_resting(&instances.list, &resting, &origin);
+    if !(same && top.refit(&instances.list, &meshes.bounds, &instances.rewritten_slots, &origin)) {
+        *top = TopLevel::with_resting(&instances.list, &meshes.bounds, &resting, &origin);
     }
 }
