@@ -1,7 +1,6 @@
 //! What rays meet: the objects of a frame and their trees.
 
 use super::movers::Movers;
-use super::spheres::LANES;
 use super::top::{Joined, Leaf};
 use super::wide::sphere_hits;
 use super::{MeshTree, TopLevel};
@@ -47,7 +46,7 @@ impl Nearest {
     }
 
     /// A hit of a sphere, or infinity.
-    #[inline(always)]
+    #[inline]
     fn offer_sphere(&mut self, t: f64, instance: u32) {
         if t < f64::INFINITY {
             self.offer(Some(Hit { t, instance, primitive: 0, weights: DVec2::ZERO }));
@@ -92,8 +91,8 @@ impl SceneGeometry<'_> {
                 (Leaf::Spheres(block), _) => {
                     let block = &self.top.spheres[block];
                     let t = sphere_hits(block, &whole, end);
-                    for lane in 0..LANES {
-                        nearest.offer_sphere(t[lane], block.instances[lane]);
+                    for (t, instance) in t.into_iter().zip(block.instances) {
+                        nearest.offer_sphere(t, instance);
                     }
                 }
                 (Leaf::Resting, Some(joined)) => nearest.offer(hit_joined(joined, ray, end)),

@@ -140,8 +140,9 @@ fn segments_for(movers: &[Mover], instances: &[Instance]) -> usize {
     let (mut segments, mut now) = (1, area(1));
     while 2 * segments <= most {
         let halved = area(2 * segments);
-        // Also where areas are beyond the range of numbers.
-        if !(halved <= WORTH * now) {
+        // Also where areas are beyond the range of numbers and nothing is known.
+        let is_worth_it = halved <= WORTH * now;
+        if !is_worth_it {
             break;
         }
         (segments, now) = (2 * segments, halved);
