@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_block_hits_what_its_spheres_hit() {
         let mut seen = [0; 2];
-        for number in 0..20_000 {
+        for number in 0..40_000 {
             let s = Sampler::new(31, 0, (number, 0), 0);
             let three = |k| (s.two(k).extend(s.one(k + 2)) - 0.5).as_dvec3();
             let size = 10.0_f64.powf(f64::from(s.one(3)) * 15.0 - 9.0);
