@@ -153,3 +153,47 @@ fn a_world_changed_between_frames_equals_a_new_one() {
     frame(&mut new, 5);
     assert!(frame(&mut old, 2).same_bits(&frame(&mut new, 2)), "an emission removed");
 }
+
+/// `bvh` set anew between frames of one world: the trees of meshes are built again, those at rest in their
+/// shared tree among them, and the picture keeps its bits.
+#[test]
+fn another_quality_of_trees_rebuilds_them_and_shows_the_same() {
+    use kinora::build::bvh::{MeshTrees, RestingTree, WideTree};
+    use kinora::description::BvhQuality;
+    use kinora::world::Settings;
+    let text = format!(
+        r#"(
+        render: (samples: 8, size: (60, 40), max_depth: 4),
+        materials: {{ "clay": Diffuse(albedo: (0.7, 0.6, 0.5)) }},
+        meshes: {{ {}, {}, {} }},
+        entities: {{
+            "camera": (transform: (translation: (0, 1, 6), look_at: (0, 0, 0)), camera: (fov: 50)),
+            "left": (transform: (translation: (-2, 0, 0)), shape: Mesh("one"), material: "clay"),
+            "right": (transform: (translation: (2, 0, 0)), shape: Mesh("two"), material: "clay"),
+            "ball": (transform: (translation: (0, 0, 1)), velocity: (linear: (3, 1, 0)),
+                     shape: Mesh("three"), material: "clay"),
+            "sky": (light: Sky(radiance: (1, 1, 1))),
+        }})"#,
+        mesh_text("one", &icosphere(2, true)),
+        mesh_text("two", &icosphere(3, true)),
+        mesh_text("three", &icosphere(3, false)),
+    );
+    let description = scene(&text);
+    let mut world = Simulation::from_description(&description);
+    let first = frame(&mut world, 0);
+    assert_eq!(frame(&mut world, 0).report.rebuilt, Vec::<String>::new());
+    for quality in [BvhQuality::Fast, BvhQuality::Best, BvhQuality::Balanced] {
+        world.world_mut().resource_mut::<Settings>().0.bvh = quality;
+        let again = frame(&mut world, 0);
+        let rebuilt = &again.report.rebuilt;
+        assert!(rebuilt.contains(&"tree of resting meshes".to_owned()), "{rebuilt:?}");
+        assert!(rebuilt.contains(&"mesh trees: 1 of 3".to_owned()), "{rebuilt:?}");
+        assert!(first.same_bits(&again), "{quality:?}");
+        let tables = world.world();
+        let ball = &tables.resource::<MeshTrees>().list[2];
+        assert_eq!(ball.memory(), WideTree::build(&ball.mesh, quality).memory(), "{quality:?}");
+        assert!(tables.resource::<RestingTree>().built);
+        let rebuilt = frame(&mut world, 0).report.rebuilt;
+        assert!(rebuilt.is_empty(), "the same quality again: {rebuilt:?}");
+    }
+}

@@ -5,7 +5,7 @@
 //! ```text
 //! --quick         smaller meshes, fewer repetitions
 //! --json FILE     the same numbers by the same names
-//! --only A,B      of rays, build, samples, frame, growth
+//! --only A,B      of rays, build, shapes, motion, samples, frame, growth
 //! --convergence   CPU-seconds of whole renders to a relMSE of 1e-3, and their memory
 //! ```
 //!
@@ -17,9 +17,11 @@ mod clock;
 mod convergence;
 mod frames;
 mod growth;
+mod motion;
 mod rays;
 mod report;
 mod samples;
+mod shapes;
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -82,9 +84,11 @@ fn main() -> ExitCode {
         }
     };
     let mut report = Report::default();
-    let sections: [(&str, fn(&Options, &mut Report)); 5] = [
+    let sections: [(&str, fn(&Options, &mut Report)); 7] = [
         ("rays", rays::run),
         ("build", builds::run),
+        ("shapes", shapes::run),
+        ("motion", motion::run),
         ("samples", samples::run),
         ("frame", frames::run),
         ("growth", growth::run),

@@ -4,8 +4,8 @@
 //! Its size follows from the number of triangles ([`WideTree::forecast`]), so the system is asked for
 //! as much first: what it refuses becomes an error of the frame.
 
-use super::bvh::{MeshTrees, WideTree};
-use crate::extract::Meshes;
+use super::bvh::{MeshTrees, RestingTree, WideTree};
+use crate::extract::{Meshes, RestingMeshes};
 use crate::world::Settings;
 use bevy_ecs::prelude::*;
 use std::collections::{HashSet, TryReserveError};
@@ -20,26 +20,42 @@ pub struct TreeMemory {
     pub refused: Option<TryReserveError>,
 }
 
-/// Writes [`TreeMemory`] when a mesh was added, replaced or removed, or a frame was refused before.
+/// Writes [`TreeMemory`] when a mesh was added, replaced or removed, when others stand still than before,
+/// for another quality of trees, or when a frame was refused before.
 pub fn forecast_tree_memory(
     meshes: Res<Meshes>,
     trees: Res<MeshTrees>,
+    resting: Res<RestingMeshes>,
+    shared: Res<RestingTree>,
     settings: Res<Settings>,
     mut memory: ResMut<TreeMemory>,
 ) {
-    if !meshes.is_changed() && memory.refused.is_none() {
+    let quality = settings.0.bvh;
+    let outdated =
+        shared.is_outdated(quality) || trees.list.iter().any(|tree| tree.is_outdated(quality));
+    let changed = meshes.is_changed() || resting.is_changed() || outdated;
+    if !changed && memory.refused.is_none() {
         if memory.forecast != 0 {
             memory.bypass_change_detection().forecast = 0;
         }
         return;
     }
-    let known: HashSet<_> = trees.list.iter().map(|tree| Arc::as_ptr(&tree.mesh)).collect();
-    let forecast = meshes
+    let known: HashSet<_> = trees
         .list
         .iter()
-        .filter(|mesh| !known.contains(&Arc::as_ptr(mesh)))
-        .map(|mesh| WideTree::forecast(mesh.triangles.len(), settings.0.bvh))
-        .sum();
+        .filter(|tree| !tree.is_elsewhere() && !tree.is_outdated(quality))
+        .map(|tree| Arc::as_ptr(&tree.mesh))
+        .collect();
+    let joined: HashSet<u32> = if resting.0.len() < 2 {
+        HashSet::new()
+    } else {
+        resting.0.iter().map(|member| member.mesh).collect()
+    };
+    let own = (0..)
+        .zip(&meshes.list)
+        .filter(|(slot, mesh)| !joined.contains(slot) && !known.contains(&Arc::as_ptr(mesh)));
+    let own: usize = own.map(|(_, mesh)| WideTree::forecast(mesh.triangles.len(), quality)).sum();
+    let forecast = own + RestingTree::forecast(&resting.0, &meshes.list, quality);
     *memory = TreeMemory { forecast, refused: ask_for(forecast).err() };
 }
 
@@ -83,6 +99,57 @@ mod tests {
         assert_eq!(forecast(&simulation), WideTree::forecast(5, BvhQuality::default()));
         simulation.prepare_frame(1).expect("five triangles fit");
         assert_eq!(forecast(&simulation), 0, "nothing new");
+    }
+
+    /// 5000 triangles over hills.
+    fn hills(number: u32) -> TriangleMesh {
+        let corner = |k: u32| {
+            let (x, z) = ((k % 51) as f32, (k / 51) as f32);
+            Vec3::new(x, (0.3 * x + number as f32).sin() + (0.4 * z).cos(), z)
+        };
+        let cell = |k: u32| {
+            let a = k / 50 * 51 + k % 50;
+            [[a, a + 51, a + 1], [a + 1, a + 51, a + 52]]
+        };
+        TriangleMesh {
+            positions: (0..51 * 51).map(corner).collect(),
+            triangles: (0..2500).flat_map(cell).collect(),
+            ..Default::default()
+        }
+    }
+
+    /// Bytes that the trees of a world hold, the copy of what stands still among them.
+    fn held(simulation: &Simulation) -> usize {
+        let own = &simulation.world().resource::<MeshTrees>().list;
+        let own: usize = own.iter().map(|tree| tree.memory()).sum();
+        own + simulation.world().resource::<RestingTree>().memory()
+    }
+
+    /// Oracle: what is held afterwards. Three meshes of thousands of triangles at rest, in one tree with
+    /// their second copy, and one of two objects, in its own; then for another quality.
+    #[test]
+    fn the_forecast_is_what_trees_and_copies_take() {
+        let mut simulation = Simulation::new();
+        let world = simulation.world_mut();
+        world.spawn(Camera::default());
+        for (number, objects) in [(0, 1), (1, 1), (2, 1), (3, 2)] {
+            let raw = hills(number);
+            let mesh = world.spawn(Mesh::new(Arc::new(raw))).id();
+            for _ in 0..objects {
+                world.spawn(Shape::Mesh(mesh));
+            }
+        }
+        for quality in BvhQuality::ALL {
+            simulation.world_mut().resource_mut::<Settings>().0.bvh = quality;
+            simulation.prepare_frame(0).expect("they fit");
+            assert!(simulation.world().resource::<RestingTree>().built);
+            let forecast = simulation.world().resource::<TreeMemory>().forecast as f64;
+            let share = forecast / held(&simulation) as f64;
+            // As WideTree::forecast promises.
+            assert!((share - 1.0).abs() < 0.2, "{quality:?}: {share}");
+        }
+        simulation.prepare_frame(1).expect("they fit");
+        assert_eq!(simulation.world().resource::<TreeMemory>().forecast, 0, "nothing new");
     }
 
     /// What a frame whose trees do not fit says.

@@ -19,7 +19,7 @@ use super::{Emissions, Instances, NOTHING, PunctualLight, Surfaces};
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::math::Aabb;
 use crate::shade::MaterialTable;
-use crate::shade::texture::{average, luminance};
+use crate::shade::texture::luminance;
 use std::f64::consts::PI;
 
 /// `Σ A·L` and `Σ A·L²` over the lamps.
@@ -51,10 +51,10 @@ impl TextureMeans {
         match value {
             Value::Constant(color) => f64::from(luminance(*color)),
             Value::Texture(index) => {
-                let (index, textures) = (*index as usize, materials.textures());
+                let textures = materials.textures();
                 self.0.resize(textures.len(), None);
-                let Some(known) = self.0.get_mut(index) else { return 0.0 };
-                *known.get_or_insert_with(|| f64::from(luminance(average(&textures[index]))))
+                let Some(known) = self.0.get_mut(*index as usize) else { return 0.0 };
+                *known.get_or_insert_with(|| f64::from(luminance(textures.average(*index))))
             }
         }
     }

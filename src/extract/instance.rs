@@ -1,7 +1,7 @@
 //! One object as the renderer sees it: what it is made of, and where it is over the shutter.
 
 use super::Meshes;
-use crate::math::{Aabb, MotionTransform};
+use crate::math::{Aabb, MotionTransform, swept_bounds};
 use crate::shade::TextureNeeds;
 use crate::shape::Primitive;
 use crate::world::{Shape, ShutterMotion};
@@ -116,40 +116,13 @@ pub(super) fn placed(
     let motion = MotionTransform::new(&keys);
     let bounds = match geometry {
         Geometry::Primitive(Primitive::Plane) => bounds,
-        _ => shutter_bounds(&bounds, &keys, &motion),
+        _ => swept_bounds(&bounds, &motion, 0.0, 1.0),
     };
     Some(Placed { geometry, size: scale, motion, bounds, place })
 }
 
 fn canonical(primitive: Primitive, scale: DVec3) -> (Geometry, DVec3, Aabb) {
     (Geometry::Primitive(primitive), scale, primitive.bounds())
-}
-
-/// A box around `bounds` carried along the motion.
-///
-/// Between two keys a point `q(s) = lerp(S₀p, S₁p, s)` is turned by `R(s)`, an angle `θ` in all. It
-/// strays from the chord between its two ends by at most `r(1 − cos ½θ) + ½·sin ½θ·|S₁p − S₀p|`, with
-/// `r` the greatest `|q|`: the sagitta of its arc, and what the change of its radius adds on the way.
-/// Boxes around the keys, padded by that, hold the segment.
-fn shutter_bounds(bounds: &Aabb, keys: &[DAffine3], motion: &MotionTransform) -> Aabb {
-    let around_keys = keys.iter().fold(Aabb::EMPTY, |all, key| all.union(bounds.transformed(key)));
-    let MotionTransform::Moving { keys: split } = motion else { return around_keys };
-    let corners = bounds.corners().map(glam::Vec3::as_dvec3);
-    let mut pad = 0.0_f64;
-    for pair in split.windows(2) {
-        let half = 0.5 * pair[0].rotation.angle_between(pair[1].rotation);
-        let half = half.min(std::f64::consts::PI - half);
-        let (mut reach, mut stretch) = (0.0_f64, 0.0_f64);
-        for corner in corners {
-            let (a, b) = (pair[0].stretch * corner, pair[1].stretch * corner);
-            reach = reach.max(a.length()).max(b.length());
-            stretch = stretch.max(a.distance(b));
-        }
-        // 1 − cos x = 2 sin²(x/2), without cancellation
-        let sagitta = reach * 2.0 * (0.5 * half).sin().powi(2);
-        pad = pad.max(sagitta + 0.5 * half.sin() * stretch);
-    }
-    around_keys.inflated((pad as f32).next_up())
 }
 
 #[cfg(test)]
@@ -173,7 +146,7 @@ mod tests {
             };
             let keys: Vec<_> = (0..3).map(|k| key(f64::from(k) / 2.0)).collect();
             let motion = MotionTransform::new(&keys);
-            let bounds = shutter_bounds(&shape, &keys, &motion);
+            let bounds = swept_bounds(&shape, &motion, 0.0, 1.0);
             let mut tight = Aabb::EMPTY;
             for k in 0..=200_u16 {
                 tight = tight.union(shape.transformed(&motion.at(f32::from(k) / 200.0)));

@@ -27,6 +27,8 @@ pub struct Meshes {
     /// which keeps its form. `list` holds the first key.
     pub later_keys: Vec<Arc<Vec<Vertices>>>,
     slots: EntityHashMap<(u32, Aabb)>,
+    /// For each the box around it during the whole shutter.
+    pub(crate) bounds: Vec<Aabb>,
 }
 
 impl Meshes {
@@ -52,6 +54,7 @@ pub fn extract_meshes(
     let table = &mut *table;
     table.list.clear();
     table.later_keys.clear();
+    table.bounds.clear();
     table.slots.clear();
     for ((entity, mesh, motion, deforms), slot) in found.into_iter().zip(0..) {
         let (data, later, bounds) = match motion.filter(|_| deforms) {
@@ -60,6 +63,7 @@ pub fn extract_meshes(
         };
         table.list.push(data.clone());
         table.later_keys.push(later);
+        table.bounds.push(bounds);
         table.slots.insert(entity, (slot, bounds));
     }
 }

@@ -7,6 +7,7 @@ mod motion;
 mod ray;
 
 mod rounding;
+mod swept;
 
 pub use bounds::Aabb;
 pub use cone::Cone;
@@ -15,3 +16,4 @@ pub use motion::{Decomposed, MotionTransform};
 pub use ray::Ray;
 
 pub use rounding::{gamma, gamma_f64, offset_ray_origin};
+pub use swept::swept_bounds;

@@ -50,6 +50,7 @@ impl Decomposed {
     }
 
     /// The map with these parts.
+    #[inline]
     pub fn compose(&self) -> DAffine3 {
         DAffine3 {
             matrix3: DMat3::from_quat(self.rotation) * self.stretch,
@@ -58,17 +59,21 @@ impl Decomposed {
     }
 
     /// The map a share `s` of the way to `other`; the rotation takes the shorter arc.
+    #[inline]
     pub fn interpolate(&self, other: &Self, s: f64) -> DAffine3 {
+        self.between(other, s).compose()
+    }
+
+    /// The parts of that map.
+    #[inline]
+    fn between(&self, other: &Self, s: f64) -> Self {
         let rotation = if self.rotation == other.rotation {
             self.rotation
         } else {
             self.rotation.slerp(other.rotation, s)
         };
         let stretch = self.stretch * (1.0 - s) + other.stretch * s;
-        DAffine3 {
-            matrix3: DMat3::from_quat(rotation) * stretch,
-            translation: self.translation.lerp(other.translation, s),
-        }
+        Self { translation: self.translation.lerp(other.translation, s), rotation, stretch }
     }
 }
 
@@ -139,6 +144,27 @@ impl MotionTransform {
         places.iter().copied().chain(keys.iter().map(|key| key.translation))
     }
 
+    /// A key, split. What does not turn within the shutter has no rotation and all else in its stretch.
+    pub(super) fn key(&self, k: usize) -> Decomposed {
+        match self {
+            Self::Static { forward, .. } => unturned(forward.matrix3, forward.translation),
+            Self::Sliding { forward, places, .. } => unturned(*forward, places[k]),
+            Self::Moving { keys } => keys[k],
+        }
+    }
+
+    /// World from object at time `u` in `[0, 1]` of the shutter, split as [`MotionTransform::key`] is.
+    pub(super) fn key_at(&self, u: f32) -> Decomposed {
+        match self {
+            Self::Static { .. } => self.key(0),
+            Self::Sliding { forward, places, .. } => unturned(*forward, place_at(places, u)),
+            Self::Moving { keys } => {
+                let (first, share) = segment(keys.len(), u);
+                keys[first].between(&keys[first + 1], share)
+            }
+        }
+    }
+
     /// World from object at time `u` in `[0, 1]` of the shutter.
     #[inline]
     pub fn at(&self, u: f32) -> DAffine3 {
@@ -179,6 +205,11 @@ impl MotionTransform {
             Self::Moving { .. } => self.at(u).inverse(),
         }
     }
+}
+
+/// A map without rotation.
+fn unturned(linear: DMat3, translation: DVec3) -> Decomposed {
+    Decomposed { translation, rotation: DQuat::IDENTITY, stretch: linear }
 }
 
 /// The segment between `count` keys in which the time `u` lies, and the share of it that has passed.

@@ -69,6 +69,11 @@ impl MeshTree {
         matches!(self.tree, Tree::Elsewhere)
     }
 
+    /// Whether it has to be built anew for another quality.
+    pub(crate) fn is_outdated(&self, quality: BvhQuality) -> bool {
+        !self.is_elsewhere() && self.quality != quality
+    }
+
     /// How its tree was built.
     pub(crate) fn quality(&self) -> BvhQuality {
         self.quality
@@ -175,8 +180,7 @@ pub fn rebuild_mesh_trees(
     mut trees: ResMut<MeshTrees>,
 ) {
     let quality = settings.0.bvh;
-    let outdated =
-        |tree: &Arc<MeshTree>| !matches!(tree.tree, Tree::Elsewhere) && tree.quality != quality;
+    let outdated = |tree: &Arc<MeshTree>| tree.is_outdated(quality);
     if !(meshes.is_changed() || resting.is_changed() || trees.list.iter().any(outdated)) {
         if trees.built != 0 {
             trees.bypass_change_detection().built = 0;

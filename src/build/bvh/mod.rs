@@ -3,13 +3,18 @@
 //! * A [`WideTree`] per mesh, in the mesh's own space, kept over frames.
 //! * One more over all meshes which stand still and are used once ([`RestingTree`]).
 //! * A tree over the objects of a frame ([`TopLevel`]), whose leaves lead to these and to analytic shapes.
+//! * For what moves far within the shutter a tree for each part of it.
 //!
 //! `tree` holds the binary tree that the top level is made from.
 
 mod geometry;
 mod mesh_tree;
+mod movers;
 mod resting;
+mod spheres;
 mod surface;
+#[cfg(test)]
+mod tests;
 mod texture_point;
 mod top;
 mod tree;

@@ -7,13 +7,13 @@
 //! In the shared space corners are rounded to `f32` anew. A mesh joins only where this is too little to
 //! be seen: see [`WORST_ROUNDING`].
 
-use super::MeshTree;
+use super::{MeshTree, WideTree};
 use crate::description::{BvhQuality, TriangleMesh};
 use crate::extract::{FrameOrigin, Meshes, RestingMesh, RestingMeshes};
 use crate::math::gamma_f64;
 use crate::world::Settings;
 use bevy_ecs::prelude::*;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
 /// The most by which joining may move a corner, as a share of the mean length of the edges of its
@@ -48,7 +48,14 @@ impl RestingTree {
         if members.len() < 2 {
             return Self::default();
         }
-        let mut shared = TriangleMesh::default();
+        let total = |of: fn(&TriangleMesh) -> usize| {
+            members.iter().map(|member| of(&meshes[member.mesh as usize])).sum()
+        };
+        let mut shared = TriangleMesh {
+            positions: Vec::with_capacity(total(|mesh| mesh.positions.len())),
+            triangles: Vec::with_capacity(total(|mesh| mesh.triangles.len())),
+            ..Default::default()
+        };
         let mut starts = Vec::with_capacity(members.len());
         for member in members {
             let mesh = &meshes[member.mesh as usize];
@@ -67,9 +74,40 @@ impl RestingTree {
         Some(self.members[k].0)
     }
 
-    /// Bytes held.
+    /// Bytes held: the tree, and the corners and triangles in the shared space.
     pub fn memory(&self) -> usize {
-        self.tree.as_ref().map_or(0, |tree| tree.memory())
+        let copy = |mesh: &TriangleMesh| {
+            mesh.positions.capacity() * size_of::<Vec3>()
+                + mesh.triangles.capacity() * size_of::<[u32; 3]>()
+        };
+        let tree = self.tree.as_ref().map_or(0, |tree| tree.memory() + copy(&tree.mesh));
+        tree + self.members.capacity() * size_of::<(u32, u32)>()
+    }
+
+    /// Bytes that the tree over these meshes will hold, before it is built; 0 where it will not be.
+    ///
+    /// It counts as if all of them could be joined: those which cannot take as much in trees of their own,
+    /// but for the copy.
+    pub fn forecast(
+        resting: &[RestingMesh],
+        meshes: &[Arc<TriangleMesh>],
+        quality: BvhQuality,
+    ) -> usize {
+        if resting.len() < 2 {
+            return 0;
+        }
+        let own = resting.iter().map(|member| &meshes[member.mesh as usize]);
+        let (vertices, triangles) = own.fold((0, 0), |(vertices, triangles), mesh| {
+            (vertices + mesh.positions.len(), triangles + mesh.triangles.len())
+        });
+        WideTree::forecast(triangles, quality)
+            + vertices * size_of::<Vec3>()
+            + triangles * size_of::<[u32; 3]>()
+    }
+
+    /// Whether it has to be built anew for another quality.
+    pub(crate) fn is_outdated(&self, quality: BvhQuality) -> bool {
+        self.tree.is_some() && self.quality != quality
     }
 
     /// Instance and triangle of its mesh of a triangle of the shared tree.
@@ -141,13 +179,49 @@ pub fn join_resting_meshes(
     mut tree: ResMut<RestingTree>,
 ) {
     let quality = settings.0.bvh;
-    let outdated = tree.tree.is_some() && tree.quality != quality;
-    if resting.is_changed() || outdated || (meshes.is_changed() && !resting.0.is_empty()) {
+    if resting.is_changed()
+        || tree.is_outdated(quality)
+        || (meshes.is_changed() && !resting.0.is_empty())
+    {
         let built = RestingTree::build(&resting.0, &meshes.list, quality);
         if built.tree.is_some() || tree.tree.is_some() {
             *tree = built;
         }
     } else if tree.built {
         tree.bypass_change_detection().built = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DAffine3;
+
+    /// A fan of so many triangles.
+    fn fan(count: u32) -> Arc<TriangleMesh> {
+        let corner = |k: u32| Vec3::new((0.1 * k as f32).cos(), (0.1 * k as f32).sin(), k as f32);
+        Arc::new(TriangleMesh {
+            positions: (0..count + 2).map(corner).collect(),
+            triangles: (0..count).map(|k| [0, k + 1, k + 2]).collect(),
+            ..Default::default()
+        })
+    }
+
+    /// Oracle: the bytes held besides the tree, whose own forecast has a test.
+    #[test]
+    fn the_copy_takes_what_was_forecast() {
+        let meshes = [fan(300), fan(77), fan(1000)];
+        let resting: Vec<RestingMesh> = (0..3)
+            .map(|k| RestingMesh { instance: k, mesh: k, world_from_mesh: DAffine3::IDENTITY })
+            .collect();
+        let quality = BvhQuality::default();
+        let tree = RestingTree::build(&resting, &meshes, quality);
+        let shared = tree.tree.as_ref().expect("three may be joined");
+        assert_eq!(shared.mesh.triangles.len(), 1377);
+        let members = tree.members.capacity() * size_of::<(u32, u32)>();
+        let copy = tree.memory() - shared.memory() - members;
+        let forecast = RestingTree::forecast(&resting, &meshes, quality);
+        assert_eq!(copy, forecast - WideTree::forecast(1377, quality));
+        assert_eq!(RestingTree::forecast(&resting[..1], &meshes, quality), 0, "one is not joined");
     }
 }

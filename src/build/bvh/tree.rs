@@ -87,10 +87,53 @@ impl Bvh {
         (count == 0).then_some([first as usize, first as usize + 1])
     }
 
-    /// The first box of a leaf.
-    pub(super) fn item(&self, node: usize) -> Option<u32> {
+    /// The boxes of a leaf; none for an inner node.
+    pub(super) fn items(&self, node: usize) -> &[u32] {
         let Node { first, count, .. } = self.nodes[node];
-        (count > 0).then(|| self.order[first as usize])
+        if count == 0 { &[] } else { &self.order[first as usize..(first + count) as usize] }
+    }
+
+    /// The boxes of all leaves, leaf by leaf.
+    pub(super) fn leaves(&self) -> impl Iterator<Item = &[u32]> {
+        // Leaves were written in the order of their boxes, but parents before their children.
+        let mut open: Vec<usize> = self.root().into_iter().collect();
+        std::iter::from_fn(move || {
+            loop {
+                let node = open.pop()?;
+                let Some([a, b]) = self.children(node) else { return Some(self.items(node)) };
+                open.extend([b, a]);
+            }
+        })
+    }
+
+    /// Makes one leaf of subtrees of at most `most` boxes all of which `may_share` one, where that is
+    /// expected to save time. The nodes below stay in memory and are not reached any more.
+    ///
+    /// By the surface area heuristic, with the test of a leaf as the unit: a leaf costs its area whatever
+    /// it holds, its parts theirs and besides the area times `inner`, the cost of what divides them.
+    pub(super) fn share_leaves(&mut self, most: u32, inner: f32, may_share: impl Fn(u32) -> bool) {
+        // Children come after their parent: from the last node up all is known about them.
+        let mut costs = vec![f32::NAN; self.nodes.len()];
+        for node in (0..self.nodes.len()).rev() {
+            let Node { first, count, bounds } = self.nodes[node];
+            let area = bounds.area();
+            if count > 0 {
+                let all = self.items(node).iter().all(|&item| may_share(item));
+                costs[node] = if all { area } else { f32::NAN };
+                continue;
+            }
+            let (a, b) = (first as usize, first as usize + 1);
+            let (left, right) = (self.nodes[a], self.nodes[b]);
+            let apart = costs[a] + costs[b] + area * inner;
+            // False where a part may not share, whose cost is no number.
+            if left.count.min(right.count) > 0 && left.count + right.count <= most && area <= apart
+            {
+                // The boxes of neighbours follow one another.
+                self.nodes[node].first = left.first;
+                self.nodes[node].count = left.count + right.count;
+                costs[node] = area;
+            }
+        }
     }
 
     /// The box of a node.

@@ -11,6 +11,7 @@ use super::ray::{BoxRay, FusedRay};
 use super::traverse::{
     BlockHits, Distances, Lanes, Nodes, TriangleHit, WideCorners, any_hit, closest_hit,
 };
+use crate::build::bvh::spheres::{LANES, SphereBlock};
 use crate::shape::{LocalRay, TriangleTest};
 use std::arch::x86_64::{
     __m256, __m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ, _MM_HINT_T0, _mm_loadu_ps,
@@ -70,6 +71,23 @@ impl Avx2 {
         // SAFETY: a value of this type exists only where the features were detected.
         unsafe { visit_boxes_avx2::<STACK>(tree, prepared, t_max, visit) }
     }
+
+    /// [`SphereBlock::hits`].
+    #[inline]
+    pub(super) fn sphere_hits(
+        self,
+        block: &SphereBlock,
+        ray: &LocalRay,
+        t_max: f64,
+    ) -> [f64; LANES] {
+        // SAFETY: a value of this type exists only where the features were detected.
+        unsafe { sphere_hits_avx2(block, ray, t_max) }
+    }
+}
+
+#[target_feature(enable = "avx2,bmi1,popcnt")]
+fn sphere_hits_avx2(block: &SphereBlock, ray: &LocalRay, t_max: f64) -> [f64; LANES] {
+    block.hits(ray, t_max)
 }
 
 #[target_feature(enable = "avx2,fma,bmi1,popcnt")]

@@ -2,6 +2,7 @@
 
 use super::Instructions;
 use super::node::{Child, Node, WIDTH};
+use super::pages::on_large_pages;
 use super::ray::BoxRay;
 use super::stack::Stack;
 use super::traverse::{Distances, Lanes, Portable, child_of, distance_of, key, take_lane};
@@ -16,11 +17,13 @@ const STACK: usize = DEEPEST * (WIDTH - 1) + 1;
 const SHORT_STACK: usize = 96;
 
 /// The tree. Boxes are named by numbers of the caller's.
+///
+/// Boxes may share a leaf. It bears the name of the first of them.
 #[derive(Clone, Debug, Default)]
 pub struct BoxTree {
     /// Children come after their parent.
     nodes: Vec<Node>,
-    /// Names of the boxes, by the index in a leaf.
+    /// Names of the leaves, in the order of their nodes.
     names: Vec<u32>,
     /// Room on the stack that a traversal takes at most.
     stack: usize,
@@ -37,7 +40,7 @@ pub struct BoxTree {
 }
 
 /// A slot of a node.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Place {
     node: u32,
     slot: u32,
@@ -50,17 +53,13 @@ struct Place {
 const WORN: f64 = 1.5;
 
 impl BoxTree {
-    /// Gathers the nodes of a binary tree with one box in a leaf, the largest first, until each node
-    /// has eight children.
+    /// Gathers the nodes of a binary tree, the largest first, until each node has eight children.
     pub fn collapse(binary: &Bvh, boxes: &[Aabb], names: &[u32]) -> Self {
-        let mut tree = Self {
-            names: names.to_vec(),
-            places: vec![Place::default(); boxes.len()],
-            ..Self::default()
-        };
+        let mut tree = Self { places: vec![Place::default(); boxes.len()], ..Self::default() };
         if binary.root().is_some() {
             tree.parents.push(Place::default());
-            tree.stack = tree.emit(binary, 0);
+            tree.stack = tree.emit(binary, names, 0);
+            tree.nodes = on_large_pages(&tree.nodes);
         }
         tree.area_built = tree.area;
         tree.reach = tree.bounds().reach();
@@ -76,7 +75,12 @@ impl BoxTree {
 
     /// Number of boxes.
     pub fn len(&self) -> usize {
-        self.names.len()
+        self.places.len()
+    }
+
+    /// Whether two boxes share a leaf. Indices are those of the build.
+    pub fn share(&self, a: usize, b: usize) -> bool {
+        self.places[a] == self.places[b]
     }
 
     /// Whether there is no tree.
@@ -84,7 +88,8 @@ impl BoxTree {
         self.nodes.is_empty()
     }
 
-    /// Gives a box another size or place, and all boxes around it with it. `index` is that of the build.
+    /// Gives the leaf of a box another size or place, and all boxes around it with it. `index` is that of
+    /// the build.
     pub fn refit(&mut self, index: usize, bounds: &Aabb) {
         let Place { mut node, mut slot } = self.places[index];
         let mut bounds = *bounds;
@@ -116,7 +121,7 @@ impl BoxTree {
         self.nodes.first().map_or(Aabb::EMPTY, Node::bounds)
     }
 
-    fn emit(&mut self, binary: &Bvh, root: usize) -> usize {
+    fn emit(&mut self, binary: &Bvh, names: &[u32], root: usize) -> usize {
         let mut open = vec![root];
         loop {
             let widest = (0..open.len())
@@ -135,13 +140,17 @@ impl BoxTree {
             let bounds = binary.bounds_of(below);
             self.nodes[index].set_box(slot, &bounds);
             self.area += f64::from(bounds.area());
-            let child = if let Some(item) = binary.item(below) {
-                self.places[item as usize] = place;
-                Child::leaf(item as usize, 1)
+            let items = binary.items(below);
+            let child = if let Some(&first) = items.first() {
+                for &item in items {
+                    self.places[item as usize] = place;
+                }
+                self.names.push(names[first as usize]);
+                Child::leaf(self.names.len() - 1, 1)
             } else {
                 let child = Child::node(self.nodes.len());
                 self.parents.push(place);
-                deepest = deepest.max(self.emit(binary, below));
+                deepest = deepest.max(self.emit(binary, names, below));
                 child
             };
             self.nodes[index].children[slot] = child;
@@ -204,7 +213,11 @@ pub(super) fn visit_boxes<L: Lanes, const STACK: usize>(
             let bottom = stack.depth();
             while mask != 0 {
                 let lane = take_lane(&mut mask);
-                stack.insert(bottom, key(distances.0[lane], node.children[lane]));
+                let child = node.children[lane];
+                if !child.is_leaf() {
+                    L::prefetch((tree.nodes.as_ptr().wrapping_add(child.index()).cast(), 4));
+                }
+                stack.insert(bottom, key(distances.0[lane], child));
             }
         }
         loop {

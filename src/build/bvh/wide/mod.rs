@@ -41,6 +41,7 @@ pub use moving::MovingTree;
 pub(super) use moving::segment_of;
 pub use traverse::TriangleHit;
 
+use super::spheres::{LANES, SphereBlock};
 use crate::description::{BvhQuality, TriangleMesh};
 use crate::math::Aabb;
 use crate::shape::LocalRay;
@@ -140,6 +141,17 @@ impl Instructions {
             (Self::Portable, true) => any_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
             (Self::Portable, false) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
         }
+    }
+}
+
+/// Where a ray in render space meets the spheres of a block with `0 < t < t_max`; infinity where it does
+/// not.
+#[inline]
+pub(super) fn sphere_hits(block: &SphereBlock, ray: &LocalRay, t_max: f64) -> [f64; LANES] {
+    match Instructions::detect() {
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2(avx2) => avx2.sphere_hits(block, ray, t_max),
+        Instructions::Portable => block.hits(ray, t_max),
     }
 }
 

@@ -35,3 +35,10 @@ pub(super) fn filled_on_large_pages<T: Clone>(len: usize, value: T) -> Vec<T> {
     vec.resize(len, value);
     vec
 }
+
+/// A copy of `list` on large pages where the system has them.
+pub(super) fn on_large_pages<T: Clone>(list: &[T]) -> Vec<T> {
+    let mut vec = vec_on_large_pages(list.len());
+    vec.extend_from_slice(list);
+    vec
+}
