@@ -323,7 +323,7 @@ fn one_path_has_one_time() {
         format!(
             r#"(
             clock: (fps: 1, shutter: (0, 1)),
-            render: (filter: Box()),
+            render: (filter: Box(), integrator: Path),
             materials: {{"mirror": Mirror(), "white": Diffuse(albedo: (0.8, 0.8, 0.8))}},
             entities: {{
                 "ship": ({velocity}),
