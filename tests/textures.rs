@@ -40,7 +40,7 @@ fn rms(a: &Picture, b: &Picture, rows: std::ops::Range<u32>) -> f64 {
 /// pixels filtering takes nothing away.
 #[test]
 fn checks_to_the_horizon_become_grey() {
-    let reference = filtered(HORIZON, TextureFiltering::Point, 4096);
+    let reference = filtered(HORIZON, TextureFiltering::Point, 1024);
     let point = filtered(HORIZON, TextureFiltering::Point, 4);
     let filtered = filtered(HORIZON, TextureFiltering::Anisotropic, 4);
     // The horizon is in row 13.
@@ -84,7 +84,7 @@ fn image(file: ImageData) -> SceneTexture {
 fn images_are_filtered_by_their_pyramid() {
     let mut description = scene(HORIZON);
     description.textures.insert("checks".to_owned(), checks(64));
-    (description.render.size, description.render.samples) = ((96, 54), 4096);
+    (description.render.size, description.render.samples) = ((96, 54), 1024);
     description.render.texture_filter = TextureFiltering::Point;
     let reference = render_description(&description, 0);
     let mut by = |filter| {
