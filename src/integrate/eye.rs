@@ -289,15 +289,9 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             return false;
         }
         let mut lobe = sampler.one(dimensions + dimension::LOBE);
-        let bsdf = (material != NOTHING).then(|| {
-            let materials = &scene.surfaces.materials;
-            let chosen = materials.choose(material, &at, &mut lobe);
-            if let Some(relief) = chosen.relief {
-                let (Walk { cone, ray, .. }, turn) = (&*walk, (materials, relief));
-                scene.geometry.turn_normal(turn, *cone, ray, hit, &mut surface, &at);
-            }
-            materials.chosen_bsdf_within(chosen.material, &at, outside)
-        });
+        let seen = (&walk.ray, walk.cone);
+        let bsdf = (material != NOTHING)
+            .then(|| self.path.bsdf(seen, hit, &mut surface, &at, outside, &mut lobe));
         if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
             let ray = &walk.ray;
             let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());

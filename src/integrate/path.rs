@@ -289,7 +289,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             } else {
                 0.0
             };
-            let bsdf = self.bsdf(path, &hit, &mut surface, &at, outside, &mut lobe);
+            let seen = (&path.ray, path.cone);
+            let bsdf = self.bsdf(seen, &hit, &mut surface, &at, outside, &mut lobe);
             self.note_first_hit(path, camera_ray, &hit, &surface, Some(&bsdf));
             if path.depth == self.max_depth {
                 counters.truncated += 1;
@@ -349,11 +350,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         self.scene.nested().meet(ray, hit, inside, &mut counters.nesting)
     }
 
-    /// How the surface scatters that a path has met, with the relief of its material.
+    /// How the surface scatters that a ray in a cone has met, with the relief of its material.
     #[inline]
-    fn bsdf(
+    pub(super) fn bsdf(
         &self,
-        path: &Path<'a, I>,
+        (ray, cone): (&Ray, Cone),
         hit: &Hit,
         surface: &mut SurfacePoint,
         at: &TexturePoint,
@@ -365,7 +366,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let material = geometry.instances[hit.instance as usize].material;
         let chosen = materials.choose(material, at, lobe);
         if let Some(relief) = chosen.relief {
-            geometry.turn_normal((materials, relief), path.cone, &path.ray, hit, surface, at);
+            geometry.turn_normal((materials, relief), cone, ray, hit, surface, at);
         }
         if I::NESTS {
             materials.chosen_bsdf_within(chosen.material, at, outside)
