@@ -10,6 +10,8 @@ mod keys;
 mod knife;
 #[path = "../examples/make_assets/noise.rs"]
 mod noise;
+#[path = "../examples/make_assets/relief.rs"]
+mod relief;
 #[path = "../examples/make_assets/surface_net.rs"]
 mod surface_net;
 #[path = "../examples/make_assets/textures.rs"]
@@ -54,6 +56,26 @@ fn the_textures_are_those_that_the_example_paints() {
                 assert_eq!(*found, [r, g, b, 255], "{name} at ({x}, {y}): run `make_assets`");
             }
         }
+    }
+}
+
+/// As many codes as there are, within the rounding of the last bit; and the normals are those of the heights.
+#[test]
+fn the_relief_is_that_of_its_wall() {
+    let size = 512;
+    let image = load_image(&in_repository("assets/relief-height.png"), Encoding::Linear).unwrap();
+    let ImagePixels::Rgba32F(heights) = &image.pixels else { panic!("16 bits become floats") };
+    assert_eq!((image.width, image.height), (size, size));
+    for (k, height) in heights.iter().enumerate().step_by(13) {
+        let code = relief::height_code(k as u32 % size, k as u32 / size, size);
+        assert!((height[0] - f32::from(code) / 65535.0).abs() < 1e-6, "texel {k}");
+    }
+    let image = load_image(&in_repository("assets/relief-normals.png"), Encoding::Linear).unwrap();
+    let ImagePixels::Rgba8(normals, _) = &image.pixels else { panic!("8 bits stay codes") };
+    let size = image.width;
+    for (k, &[r, g, b, _]) in normals.iter().enumerate().step_by(29) {
+        let codes = relief::normal_codes(k as u32 % size, k as u32 / size, size);
+        assert_eq!([r, g, b], codes, "texel {k}: run `make_assets`");
     }
 }
 

@@ -10,18 +10,18 @@ mod glb;
 mod keys;
 mod knife;
 mod noise;
+mod relief;
 mod surface_net;
 mod textures;
 mod water;
 mod wine_glass;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ImageBuffer, Rgb};
+use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType, Rgb};
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
-use textures::Painting;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let argument = std::env::args().nth(1);
@@ -40,8 +40,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         fs::write(folder.join(name), mesh.to_glb())?;
     }
     for (name, painting) in &textures::ALL {
-        save(painting, &folder.join(name))?;
+        let (width, height) = painting.size;
+        let image = ImageBuffer::from_fn(width, height, |x, y| Rgb(painting.pixel(x, y)));
+        save(&image, &folder.join(name))?;
     }
+    let heights = ImageBuffer::from_fn(512, 512, |x, y| Luma([relief::height_code(x, y, 512)]));
+    save(&heights, &folder.join("relief-height.png"))?;
+    let normals = ImageBuffer::from_fn(1024, 1024, |x, y| Rgb(relief::normal_codes(x, y, 1024)));
+    save(&normals, &folder.join("relief-normals.png"))?;
     Ok(())
 }
 
@@ -58,9 +64,11 @@ fn meshes() -> [(&'static str, glb::Mesh); 5] {
 }
 
 /// Writes a PNG as small as the encoder can make it: these files are kept.
-fn save(painting: &Painting, path: &Path) -> Result<(), Box<dyn Error>> {
-    let (width, height) = painting.size;
-    let image = ImageBuffer::from_fn(width, height, |x, y| Rgb(painting.pixel(x, y)));
+fn save<P>(image: &ImageBuffer<P, Vec<P::Subpixel>>, path: &Path) -> Result<(), Box<dyn Error>>
+where
+    P: PixelWithColorType,
+    [P::Subpixel]: EncodableLayout,
+{
     let file = BufWriter::new(File::create(path)?);
     let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
     image.write_with_encoder(encoder)?;

@@ -5,6 +5,7 @@ mod camera;
 mod diagnostic;
 mod light;
 mod material;
+pub mod modelling;
 mod motion;
 mod photons;
 mod read;
@@ -24,7 +25,7 @@ pub use motion::{
 };
 pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
-pub use scene::{EntityDescription, SceneDescription};
+pub use scene::{Displacement, EntityDescription, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{

@@ -8,6 +8,17 @@ use indexmap::IndexMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// How a mesh is moved along its normals by a texture. `R` refers to a texture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Displacement<R> {
+    /// The texture whose number is the height.
+    pub height: R,
+    /// Metres of a height of 1.
+    pub strength: f32,
+    /// The height which stays where it is.
+    pub middle: f32,
+}
+
 /// A scene: everything that `load_scene` found, checked, with every named file read.
 ///
 /// All references are names which exist; all numbers are finite and in range.
@@ -32,6 +43,8 @@ pub struct SceneDescription {
     pub materials: IndexMap<String, Material<String>>,
     /// Meshes by name.
     pub meshes: IndexMap<String, Arc<TriangleMesh>>,
+    /// The meshes which textures displace, by name; `meshes` holds them before.
+    pub displacements: IndexMap<String, Displacement<String>>,
     /// The meshes which are surfaces of water, by name; `meshes` holds them at rest.
     pub waves: IndexMap<String, Waves>,
     /// Entities by name, in the order of the file.

@@ -1,13 +1,14 @@
 //! Objects as a flat table of instances.
 
+use super::displace::Displaced;
 use super::instance::{Instance, NOTHING, Place, Placed, placed};
 use super::{Emissions, FrameOrigin, SurfaceSlots, Surfaces, spawn_order};
 use crate::description::TriangleMesh;
 use crate::math::Aabb;
 use crate::shade::TextureNeeds;
 use crate::world::{
-    Deformation, Emission, HiddenFromCamera, MadeOf, Material, Mesh, Name, Shape, ShutterMotion,
-    VertexMotion, Vertices,
+    Deformation, Displacement, Emission, HiddenFromCamera, MadeOf, Material, Mesh, Name, Shape,
+    ShutterMotion, VertexMotion, Vertices,
 };
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
@@ -40,13 +41,24 @@ impl Meshes {
 
 /// Writes [`Meshes`] when one was added, replaced, removed or deformed.
 pub fn extract_meshes(
-    changed: Query<(), (With<Mesh>, Or<(Changed<Mesh>, Changed<VertexMotion>)>)>,
+    changed: Query<
+        (),
+        (With<Mesh>, Or<(Changed<Mesh>, Changed<VertexMotion>, Changed<Displaced>)>),
+    >,
     mut removed: RemovedComponents<Mesh>,
-    mut rigid: RemovedComponents<Deformation>,
-    meshes: Query<(Entity, &Mesh, Option<&VertexMotion>, Has<Deformation>)>,
+    mut rigid: (RemovedComponents<Deformation>, RemovedComponents<Displacement>),
+    meshes: Query<(
+        Entity,
+        &Mesh,
+        Option<&VertexMotion>,
+        Has<Deformation>,
+        Option<&Displaced>,
+        Has<Displacement>,
+    )>,
     mut table: ResMut<Meshes>,
 ) {
-    if changed.is_empty() && removed.read().count() + rigid.read().count() == 0 {
+    let gone = removed.read().count() + rigid.0.read().count() + rigid.1.read().count();
+    if changed.is_empty() && gone == 0 {
         return;
     }
     let mut found: Vec<_> = meshes.iter().collect();
@@ -56,10 +68,12 @@ pub fn extract_meshes(
     table.later_keys.clear();
     table.bounds.clear();
     table.slots.clear();
-    for ((entity, mesh, motion, deforms), slot) in found.into_iter().zip(0..) {
-        let (data, later, bounds) = match motion.filter(|_| deforms) {
-            Some(motion) => (&motion.opening, motion.later.clone(), motion.bounds),
-            None => (mesh.data(), Arc::default(), mesh.bounds()),
+    for ((entity, mesh, motion, deforms, displaced, moved), slot) in found.into_iter().zip(0..) {
+        let (data, later, bounds) = match (motion.filter(|_| deforms), displaced.filter(|_| moved))
+        {
+            (Some(motion), _) => (&motion.opening, motion.later.clone(), motion.bounds),
+            (None, Some(displaced)) => (&displaced.mesh, Arc::default(), displaced.bounds),
+            (None, None) => (mesh.data(), Arc::default(), mesh.bounds()),
         };
         table.list.push(data.clone());
         table.later_keys.push(later);

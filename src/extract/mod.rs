@@ -7,6 +7,7 @@
 
 mod camera;
 mod caustic_noise;
+mod displace;
 mod emissions;
 mod instance;
 mod instances;
@@ -18,6 +19,7 @@ mod solids;
 mod surfaces;
 
 pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
+pub use displace::{Displaced, displace_meshes};
 pub use emissions::{Emissions, SurfaceEmission, extract_emissions};
 pub use instance::{Geometry, Instance, NOTHING};
 pub use instances::{Instances, Meshes, extract_instances, extract_meshes};
@@ -52,6 +54,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
             stamp("surfaces"),
             extract_emissions,
             stamp("emissions"),
+            displace_meshes,
             extract_meshes,
             extract_instances,
             stamp("instances"),

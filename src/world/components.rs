@@ -23,6 +23,8 @@ pub type Texture = description::Texture<Arc<ImageData>, Entity>;
 pub type Shape = description::Shape<Entity>;
 /// Light which leaves the surface of a shape.
 pub type Emission = description::Emission<Entity>;
+/// How a mesh is moved along its normals by a texture; it stands beside the [`Mesh`].
+pub type Displacement = description::Displacement<Entity>;
 /// A light without a shape.
 pub type Light = description::Light<Entity>;
 /// A camera.
@@ -52,7 +54,7 @@ macro_rules! plain_component {
 }
 
 placed_component!(Shape, Light, Camera, Velocity, Acceleration, Keyframes, LookAt);
-plain_component!(Material, Texture, Emission);
+plain_component!(Material, Texture, Emission, Displacement);
 
 impl Component for Transform {
     const STORAGE_TYPE: StorageType = StorageType::Table;

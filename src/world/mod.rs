@@ -6,7 +6,7 @@ mod resources;
 mod spawn;
 
 pub use components::{
-    Acceleration, ActiveCamera, Camera, ChildOf, Children, Emission, EmissionFactor,
+    Acceleration, ActiveCamera, Camera, ChildOf, Children, Displacement, Emission, EmissionFactor,
     HiddenFromCamera, Keyframes, Light, LocalPose, LookAt, MadeOf, Material, Mesh, Name, Optics,
     Shape, ShutterMotion, Texture, Transform, Velocity, WorldTransform,
 };

@@ -4,7 +4,7 @@ use super::{
     ActiveCamera, Camera, ChildOf, Deformation, Emission, FrameClock, HiddenFromCamera, Light,
     MadeOf, Material, Mesh, Name, Settings, Shape, Texture,
 };
-use crate::description::{EntityDescription, ImageData, SceneDescription};
+use crate::description::{Displacement, EntityDescription, ImageData, SceneDescription};
 use bevy_ecs::prelude::*;
 use indexmap::IndexMap;
 use std::convert::Infallible;
@@ -51,6 +51,11 @@ pub fn spawn_scene(world: &mut World, scene: &SceneDescription) -> SceneEntities
     }
     for (name, mesh) in &scene.meshes {
         world.entity_mut(spawned.meshes[name]).insert(Mesh::new(mesh.clone()));
+    }
+    for (name, Displacement { height, strength, middle }) in &scene.displacements {
+        let height = entity(&spawned.textures, height);
+        let displacement = super::Displacement { height, strength: *strength, middle: *middle };
+        world.entity_mut(spawned.meshes[name]).insert(displacement);
     }
     for (name, waves) in &scene.waves {
         world.entity_mut(spawned.meshes[name]).insert(Deformation::Waves(waves.clone()));

@@ -11,13 +11,14 @@ use super::waves::check_waves;
 use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
+use crate::description::modelling::{grid, subdivided};
 use crate::description::{
-    Clock, Encoding, Filter, ImageData, PhotonSettings, RenderSettings, SceneDescription,
-    SceneTexture, Texture, TriangleMesh, Waves,
+    Clock, Displacement, Encoding, Filter, ImageData, PhotonSettings, RenderSettings,
+    SceneDescription, SceneTexture, Texture, TriangleMesh, Waves,
 };
 use indexmap::IndexMap;
 use indexmap::map::Entry;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -81,11 +82,13 @@ pub(super) fn assemble(
             scene.textures.insert(name.clone(), texture);
         }
     }
-    for (name, cursor) in &names.meshes {
-        if let Some(mesh) = assets.mesh(cursor, &mut scene, report) {
-            scene.meshes.insert(name.clone(), mesh);
-        }
+    relations::check_mesh_cycles(names, report);
+    let mut made = HashSet::new();
+    for name in names.meshes.keys() {
+        assets.named_mesh(name, names, &mut made, &mut scene, report);
     }
+    // In the order of the file, whatever was made from what.
+    scene.meshes.sort_by_key(|name, _| names.meshes.get_index_of(name));
     relations::check_cycles(&scene, names, report);
     relations::check_shares(&scene, names, report);
     relations::check_normal_maps(&scene, names, report);
@@ -403,13 +406,73 @@ impl Assets<'_> {
         texture.map_refs(image, &mut Ok).ok()
     }
 
-    fn mesh(
+    /// Makes a mesh and, before it, those that it is made from; each once.
+    fn named_mesh(
         &mut self,
-        cursor: &Cursor,
+        name: &str,
+        names: &Names,
+        made: &mut HashSet<String>,
         scene: &mut SceneDescription,
         report: &mut Report,
     ) -> Option<Arc<TriangleMesh>> {
+        if made.insert(name.to_owned())
+            && let Some(mesh) = self.mesh(name, names, made, scene, report)
+        {
+            scene.meshes.insert(name.to_owned(), mesh);
+        }
+        scene.meshes.get(name).cloned()
+    }
+
+    /// The mesh that another is made from: one that keeps its form.
+    fn part(
+        &mut self,
+        cursor: &Cursor,
+        of: &str,
+        names: &Names,
+        made: &mut HashSet<String>,
+        scene: &mut SceneDescription,
+        report: &mut Report,
+    ) -> Option<Arc<TriangleMesh>> {
+        let place = cursor.at("of");
+        if names.complete {
+            surface::reference(report, &place, of, &names.meshes, "mesh", "meshes");
+        }
+        let mesh = self.named_mesh(of, names, made, scene, report)?;
+        if scene.waves.contains_key(of) || scene.displacements.contains_key(of) {
+            let what = if scene.waves.contains_key(of) { "moves" } else { "is displaced" };
+            let message = format!("`{of}` {what}: other meshes cannot be made from it");
+            report.at("scene::conflict", &place, message);
+            return None;
+        }
+        Some(mesh)
+    }
+
+    fn mesh(
+        &mut self,
+        name: &str,
+        names: &Names,
+        made: &mut HashSet<String>,
+        scene: &mut SceneDescription,
+        report: &mut Report,
+    ) -> Option<Arc<TriangleMesh>> {
+        let cursor = &names.meshes.get(name)?.clone();
         match decode(cursor, report)? {
+            MeshFile::Grid { size, cells } => {
+                surface::check_grid(cursor, size, cells, report)?;
+                Some(Arc::new(grid(size, cells)))
+            }
+            MeshFile::Subdivided { of, levels, form } => {
+                let mesh = self.part(cursor, &of, names, made, scene, report)?;
+                surface::check_levels(cursor, &mesh, levels, report)?;
+                Some(Arc::new(subdivided(&mesh, levels, form)))
+            }
+            MeshFile::Displaced { of, height, strength, middle } => {
+                let displacement = Displacement { height, strength, middle };
+                surface::check_displacement(cursor, &displacement, names, report);
+                let mesh = self.part(cursor, &of, names, made, scene, report)?;
+                scene.displacements.insert(name.to_owned(), displacement);
+                Some(mesh)
+            }
             MeshFile::Triangles { positions, triangles, normals, uvs, colors } => {
                 surface::check_triangles(
                     cursor, positions, &triangles, normals, uvs, colors, report,

@@ -10,7 +10,7 @@ use crate::description::{
     Shape, Texture, Value,
 };
 use indexmap::IndexMap;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Reports entities which are their own ancestors, and materials and textures made of themselves.
 pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
@@ -57,6 +57,28 @@ pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut
     for (name, field, path) in cycles(&parts) {
         let message = format!("the texture `{name}` is made of itself: {path}");
         report.at("scene::cycle", &names.textures[name].at(field), message);
+    }
+}
+
+/// Reports meshes which are made from themselves, by what their text says of `of`.
+pub(super) fn check_mesh_cycles(names: &Names, report: &mut Report) {
+    let of: HashMap<&str, String> = names
+        .meshes
+        .iter()
+        .filter_map(|(name, mesh)| {
+            let part = mesh.field("of")?;
+            Some((name.as_str(), super::outline::unquoted(part.text())))
+        })
+        .collect();
+    let parts: IndexMap<&str, Vec<(&str, &str)>> = names
+        .meshes
+        .keys()
+        .map(|name| (name.as_str(), of.get(name.as_str()).map(|part| ("of", part.as_str()))))
+        .map(|(name, part)| (name, part.into_iter().collect()))
+        .collect();
+    for (name, field, path) in cycles(&parts) {
+        let message = format!("the mesh `{name}` is made from itself: {path}");
+        report.at("scene::cycle", &names.meshes[name].at(field), message);
     }
 }
 
@@ -243,7 +265,16 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
     for entity in scene.entities.values() {
         used.extend(entity.material.iter().map(|name| ("material", name.clone())));
         if let Some(Shape::Mesh(name)) = &entity.shape {
-            used.insert(("mesh", name.clone()));
+            let mut of = Some(name.clone());
+            while let Some(name) = of {
+                let height = scene.displacements.get(&name).map(|by| by.height.clone());
+                used.extend(height.map(|height| ("texture", height)));
+                let part = names.meshes.get(&name).and_then(|mesh| mesh.field("of"));
+                of = part.map(|part| super::outline::unquoted(part.text()));
+                if !used.insert(("mesh", name)) {
+                    break;
+                }
+            }
         }
         let emitted = entity.emission.as_ref().and_then(|emission| match &emission.strength {
             EmissionStrength::Radiance(value) => value.texture(),

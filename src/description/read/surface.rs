@@ -4,9 +4,12 @@ use super::Names;
 use super::decode::{Report, decode};
 use super::limits::{self, Limits};
 use super::source::Cursor;
+use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
+use crate::description::modelling::Subdivision;
 use crate::description::{
-    Emission, EmissionStrength, Light, Material, Rgb, Shape, Texture, TriangleMesh, Value, Wave,
+    Displacement, Emission, EmissionStrength, Light, Material, Rgb, Shape, Texture, TriangleMesh,
+    Value, Wave,
 };
 use glam::{DVec2, Vec2, Vec3};
 use indexmap::IndexMap;
@@ -29,6 +32,24 @@ pub(super) enum MeshFile {
         #[serde(default)]
         colors: Vec<Rgb>,
     },
+    /// A flat grid in the xy plane, facing +z.
+    Grid { size: DVec2, cells: (u32, u32) },
+    /// A finer one.
+    Subdivided {
+        of: String,
+        levels: u32,
+        #[serde(default)]
+        form: Subdivision,
+    },
+    /// One that is moved along its normals by a texture.
+    Displaced {
+        of: String,
+        height: String,
+        #[serde(default = "centimetre")]
+        strength: f32,
+        #[serde(default)]
+        middle: f32,
+    },
     /// The moving surface of water.
     Waves {
         size: DVec2,
@@ -39,6 +60,11 @@ pub(super) enum MeshFile {
         #[serde(default = "earth")]
         gravity: f64,
     },
+}
+
+/// The usual strength of a displacement, metres.
+fn centimetre() -> f32 {
+    0.01
 }
 
 /// The acceleration of a fall on earth, metres per second squared.
@@ -355,6 +381,59 @@ pub(super) fn check_triangles(
     }
     let triangles = triangles.iter().map(|&(a, b, c)| [a, b, c]).collect();
     fine.then_some(TriangleMesh { positions, normals: unit, uvs, colors, triangles })
+}
+
+/// Checks a grid; `None` when something in it is wrong.
+pub(super) fn check_grid(
+    cursor: &Cursor,
+    size: DVec2,
+    (columns, rows): (u32, u32),
+    report: &mut Report,
+) -> Option<()> {
+    let mut fine = limits::vector(report, &cursor.at("size"), &size.to_array(), &limits::LENGTH);
+    let place = cursor.at("cells");
+    let cells = [columns, rows].map(f64::from);
+    fine &= limits::vector(report, &place, &cells, &limits::CELLS);
+    if fine {
+        fine = check_triangle_count(&place, 2.0 * cells[0] * cells[1], report);
+    }
+    fine.then_some(())
+}
+
+/// Checks how finely a mesh is divided.
+pub(super) fn check_levels(
+    cursor: &Cursor,
+    mesh: &TriangleMesh,
+    levels: u32,
+    report: &mut Report,
+) -> Option<()> {
+    let place = cursor.at("levels");
+    let count = mesh.triangles.len() as f64 * 4_f64.powi(levels.min(64) as i32);
+    check_triangle_count(&place, count, report).then_some(())
+}
+
+fn check_triangle_count(place: &Cursor, count: f64, report: &mut Report) -> bool {
+    let fine = count <= MAX_MESH_ELEMENTS as f64;
+    if !fine {
+        let message = format!(
+            "a mesh has at most {MAX_MESH_ELEMENTS} triangles, but this would have {count}"
+        );
+        report.at("scene::out-of-range", place, message);
+    }
+    fine
+}
+
+/// Checks a displacement.
+pub(super) fn check_displacement(
+    cursor: &Cursor,
+    displacement: &Displacement<String>,
+    names: &Names,
+    report: &mut Report,
+) {
+    let mut check = Parameters { cursor, names, report };
+    check.texture(&cursor.at("height"), &displacement.height);
+    check.number("strength", displacement.strength, &limits::COORDINATE);
+    check.number("middle", displacement.middle, &limits::COORDINATE);
 }
 
 /// Reads a shape and checks it.
