@@ -114,8 +114,9 @@ fn the_tree_of_instances_equals_brute_force() {
                     instance(Geometry::Mesh(0), local, &keys)
                 } else {
                     // one plane is enough
-                    let primitive = PRIMITIVES[if k == 1 { 8 } else { k % 8 }];
-                    instance(Geometry::Primitive(primitive), primitive.bounds(), &keys)
+                    let primitive = PRIMITIVES[if k == 1 { 8 } else { k % 8 }].clone();
+                    let bounds = primitive.bounds();
+                    instance(Geometry::Primitive(primitive), bounds, &keys)
                 }
             })
             .collect();

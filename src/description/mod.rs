@@ -7,6 +7,7 @@ mod light;
 mod material;
 mod motion;
 mod photons;
+mod profile;
 mod read;
 mod scene;
 mod settings;
@@ -23,6 +24,7 @@ pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
 pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
+pub use profile::{Curve, CurveError};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{EntityDescription, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};

@@ -2,7 +2,7 @@
 
 use super::Meshes;
 use crate::math::{Aabb, MotionTransform};
-use crate::shape::Primitive;
+use crate::shape::{Primitive, Revolution};
 use crate::world::{Shape, ShutterMotion};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -10,7 +10,7 @@ use glam::{DAffine3, DMat3, DVec3};
 pub const NOTHING: u32 = u32::MAX;
 
 /// The form of an instance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// An analytic shape in its canonical space.
     Primitive(Primitive),
@@ -89,6 +89,10 @@ pub(super) fn placed(
         Shape::Cone { radius, height, capped } => {
             canonical(Primitive::Cone { capped }, DVec3::new(radius, height, radius))
         }
+        Shape::Revolution { ref profile, capped } => {
+            let turned = Revolution::new(profile.clone(), capped);
+            canonical(Primitive::Revolution(turned), DVec3::ONE)
+        }
         Shape::Mesh(mesh) => {
             let (slot, bounds) = meshes.slot(mesh)?;
             (Geometry::Mesh(slot), DVec3::ONE, bounds)
@@ -116,7 +120,8 @@ pub(super) fn placed(
 }
 
 fn canonical(primitive: Primitive, scale: DVec3) -> (Geometry, DVec3, Aabb) {
-    (Geometry::Primitive(primitive), scale, primitive.bounds())
+    let bounds = primitive.bounds();
+    (Geometry::Primitive(primitive), scale, bounds)
 }
 
 /// A box around `bounds` carried along the motion.

@@ -1,15 +1,20 @@
 //! Frames, bounds, rounding bounds and rigid motion: geometry that knows nothing of light.
 
+mod bernstein;
 mod bounds;
+mod cubic;
 mod frame;
 mod motion;
+mod profile;
 mod ray;
 
 mod rounding;
 
 pub use bounds::Aabb;
+pub use cubic::{Cubic, clamped_knots, spline};
 pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
+pub use profile::{Jet, Piece, Profile, ProfileError, Ring, bracketed_root};
 pub use ray::Ray;
 
 pub use rounding::{gamma, gamma_f64, offset_ray_origin};

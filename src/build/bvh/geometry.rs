@@ -113,7 +113,7 @@ impl SceneGeometry<'_> {
     #[inline]
     fn hit_instance(&self, index: u32, instance: &Instance, ray: &Ray, t_max: f64) -> Option<Hit> {
         let local = to_instance(instance, ray);
-        match instance.geometry {
+        match &instance.geometry {
             Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).map(|hit| Hit {
                 t: hit.t,
                 instance: index,
@@ -121,7 +121,7 @@ impl SceneGeometry<'_> {
                 weights: DVec2::ZERO,
             }),
             Geometry::Mesh(mesh) => {
-                let hit = self.meshes[mesh as usize].closest_hit(&local, ray.time, t_max)?;
+                let hit = self.meshes[*mesh as usize].closest_hit(&local, ray.time, t_max)?;
                 let (primitive, weights) = (hit.triangle, hit.weights);
                 Some(Hit { t: hit.t, instance: index, primitive, weights })
             }
@@ -132,9 +132,9 @@ impl SceneGeometry<'_> {
     #[inline]
     fn blocks(&self, instance: &Instance, ray: &Ray, t_max: f64) -> bool {
         let local = to_instance(instance, ray);
-        match instance.geometry {
+        match &instance.geometry {
             Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).is_some(),
-            Geometry::Mesh(mesh) => self.meshes[mesh as usize].any_hit(&local, ray.time, t_max),
+            Geometry::Mesh(mesh) => self.meshes[*mesh as usize].any_hit(&local, ray.time, t_max),
         }
     }
 }

@@ -3,6 +3,7 @@
 use super::Names;
 use super::decode::{Report, decode};
 use super::limits::{self, Limits};
+use super::profile::check_profile;
 use super::source::Cursor;
 use crate::description::diagnostic::suggestion;
 use crate::description::{
@@ -263,6 +264,9 @@ pub(super) fn read_shape(
     names: &Names,
     report: &mut Report,
 ) -> Option<Shape<String>> {
+    if cursor.name() == "Revolution" && !check_profile(cursor, report) {
+        return None;
+    }
     let shape: Shape<String> = decode(cursor, report)?;
     let length = &limits::LENGTH;
     match &shape {
@@ -272,7 +276,7 @@ pub(super) fn read_shape(
         Shape::Rectangle { size } => {
             limits::vector(report, &cursor.at("size"), &size.to_array(), length);
         }
-        Shape::Plane {} => {}
+        Shape::Plane {} | Shape::Revolution { .. } => {}
         Shape::Box { size } => {
             limits::vector(report, &cursor.at("size"), &size.to_array(), length);
         }

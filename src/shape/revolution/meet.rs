@@ -1,0 +1,246 @@
+//! Where a ray first meets a surface of revolution.
+//!
+//! The pieces of the profile whose rings the ray passes are asked in the order in which it comes to them. A piece is crossed
+//! once or not at all, as its ends say, when the ray is steeper or flatter than it everywhere: with all directions of the
+//! piece between `d₀` and `d₁`, and the slope of the ray between `β₀` and `β₁`, the four numbers `α·dᵢ.r − βⱼ·dᵢ.y` are then
+//! of one sign (see [`Side`]). Else it is halved, and the halves which the ray cannot meet are dropped. A crossing is
+//! found by Newton's method in its bracket.
+//!
+//! Neighbouring pieces share the bits of their common end, where the side is computed by the same formula: a ray which
+//! crosses the profile crosses one of its pieces. On the ray itself counts as outside, so that a profile which begins and ends on the
+//! axis is crossed also by the ray along the axis.
+
+use super::meridian::{End, Meridian, Side, recentred};
+use crate::math::{Piece, Profile, Ring, bracketed_root};
+use crate::shape::{LocalHit, LocalRay};
+use glam::DVec2;
+
+/// Pending rings: one for each level of the tree over at most 2³² pieces.
+const MAX_DEPTH: usize = 32;
+/// Halvings of a piece for one ray. Near a point of contact a few halves remain for each of the 53 bits of the
+/// parameter; more are only spent on a ray which lies in the surface.
+const MAX_HALVINGS: u32 = 8 * f64::MANTISSA_DIGITS;
+
+/// The search for the nearest hit.
+struct Search<'a> {
+    profile: &'a Profile,
+    ray: Meridian,
+    from: f64,
+    /// The nearest so far, or the end of the ray.
+    to: f64,
+    face: Option<u32>,
+    margin: f64,
+    halvings: u32,
+}
+
+/// The nearest hit with `0 < t < t_max`, on the surface or on one of the disks with these rims.
+pub(super) fn nearest(
+    profile: &Profile,
+    caps: [Option<DVec2>; 2],
+    ray: &LocalRay,
+    t_max: f64,
+) -> Option<LocalHit> {
+    let (height, radius) = profile.sphere;
+    let (near, length, shift) = recentred(ray, height);
+    let (x, y, z) = (near.o.x, near.o.y - height, near.o.z);
+    let room = radius * radius - (x * x + y * y + z * z);
+    if room.is_nan() || room < 0.0 {
+        return None;
+    }
+    let half_chord = room.sqrt();
+    let (from, to) = ((-half_chord).max(-shift), half_chord.min(t_max * length - shift));
+    if from >= to {
+        return None;
+    }
+    let meridian = Meridian::new(&near);
+    let margin = profile.error();
+    let mut search =
+        Search { profile, ray: meridian, from, to, face: None, margin, halvings: 0 };
+    search.descend();
+    for (end, rim) in caps.into_iter().enumerate() {
+        if let Some(rim) = rim {
+            search.cap(rim, (profile.pieces.len() + end) as u32);
+        }
+    }
+    let t = (search.to + shift) / length;
+    search.face.filter(|_| t > 0.0 && t < t_max).map(|face| LocalHit { t, face })
+}
+
+impl Search<'_> {
+    /// Goes through the tree, nearer rings first.
+    fn descend(&mut self) {
+        let rings = &self.profile.rings;
+        let mut stack = [(0_u32, 0.0_f64); MAX_DEPTH];
+        let mut depth = 0;
+        let Some((mut enter, mut leave)) = self.ray.inside(&rings[0], self.from, self.to) else {
+            return;
+        };
+        let mut index = 0;
+        loop {
+            let ring = &rings[index as usize];
+            let next = if ring.second == 0 {
+                self.piece(ring.piece, (enter, leave));
+                None
+            } else {
+                let first = self.ray.inside(&rings[index as usize + 1], self.from, self.to);
+                let second = self.ray.inside(&rings[ring.second as usize], self.from, self.to);
+                match (first, second) {
+                    (Some(a), Some(b)) => {
+                        let (near, far) = ((index + 1, a), (ring.second, b));
+                        let (near, far) = if b.0 < a.0 { (far, near) } else { (near, far) };
+                        stack[depth] = (far.0, far.1.0);
+                        depth += 1;
+                        Some(near)
+                    }
+                    (Some(a), None) => Some((index + 1, a)),
+                    (None, Some(b)) => Some((ring.second, b)),
+                    (None, None) => None,
+                }
+            };
+            let next = next.or_else(|| {
+                while depth > 0 {
+                    depth -= 1;
+                    let (index, enter) = stack[depth];
+                    if enter < self.to
+                        && let Some(part) =
+                            self.ray.inside(&rings[index as usize], self.from, self.to)
+                    {
+                        return Some((index, part));
+                    }
+                }
+                None
+            });
+            let Some((found, part)) = next else { return };
+            index = found;
+            (enter, leave) = part;
+        }
+    }
+
+    /// Asks a piece whose ring the ray is in between two lengths.
+    fn piece(&mut self, index: u32, (enter, leave): (f64, f64)) {
+        let piece = &self.profile.pieces[index as usize];
+        self.halvings = MAX_HALVINGS;
+        if self.ray.is_steep() {
+            self.side(&self.ray.steep(), index, piece);
+            return;
+        }
+        if self.ray.q(enter) <= 0.0 {
+            self.side(&self.ray.shallow(-1.0), index, piece);
+        }
+        if self.ray.q(leave) >= 0.0 {
+            self.side(&self.ray.shallow(1.0), index, piece);
+        }
+    }
+
+    /// Looks for crossings of a piece with one way of the ray.
+    #[inline]
+    fn side<S: Side>(&mut self, side: &S, index: u32, piece: &Piece) {
+        let least = side.least_radius();
+        let within = (piece.start.x >= least, piece.end.x >= least);
+        let start = || end_of(side, 0.0, piece.start, piece.directions[0]);
+        let end = || end_of(side, 1.0, piece.end, piece.directions[1]);
+        let clipped = || {
+            let ends = (piece.start.x - least, piece.end.x - least);
+            let u = bracketed_root((0.0, 1.0), ends, |u| {
+                let jet = piece.jet(u);
+                (jet.p.x - least, jet.d.x)
+            });
+            end_of(side, u, DVec2::new(least, piece.jet(u).p.y), piece.direction(u))
+        };
+        let (a, b) = match within {
+            (true, true) => (start(), end()),
+            (true, false) => (start(), clipped()),
+            (false, true) => (clipped(), end()),
+            (false, false) => return,
+        };
+        self.part(side, index, piece, a, b);
+    }
+
+    /// Looks for crossings of a part of a piece.
+    fn part<S: Side>(&mut self, side: &S, index: u32, piece: &Piece, a: End, b: End) {
+        let unlike = (a.value > 0.0) != (b.value > 0.0);
+        let change = Change::between(side.alpha(), &a, &b);
+        let middle = f64::midpoint(a.u, b.u);
+        if change.one_way || self.halvings == 0 || middle <= a.u || middle >= b.u {
+            if unlike {
+                let values = (a.value, b.value);
+                let u = bracketed_root((a.u, b.u), values, |u| side.along(&piece.jet(u)));
+                let sigma = side.sigma(piece.jet(u).p);
+                if sigma > self.from && sigma < self.to {
+                    (self.to, self.face) = (sigma, Some(index));
+                }
+            }
+            return;
+        }
+        // Both ends are too far from 0 to get there and back. The way along a monotone curve is no longer than
+        // along the sides of its box.
+        let way = (b.p - a.p).abs().element_sum();
+        if !unlike && (a.value + b.value).abs() > side.rate(change.greatest, &a, &b) * way {
+            return;
+        }
+        self.halvings -= 1;
+        let m = end_of(side, middle, piece.jet(middle).p, piece.direction(middle));
+        for (a, b) in [(a, m), (m, b)] {
+            if self.reaches(a.p, b.p) {
+                self.part(side, index, piece, a, b);
+            }
+        }
+    }
+
+    /// Whether the ray may meet what lies in the ring between two points.
+    fn reaches(&self, a: DVec2, b: DVec2) -> bool {
+        let (least, most) = (a.min(b) - self.margin, a.max(b) + self.margin);
+        let radii_squared = [least.x.max(0.0).powi(2), most.x.powi(2)];
+        let ring = Ring { heights: [least.y, most.y], radii_squared, second: 0, piece: 0 };
+        self.ray.inside(&ring, self.from, self.to).is_some()
+    }
+
+    /// Asks a disk, by the same sides of its rim as the piece that ends there.
+    fn cap(&mut self, rim: DVec2, face: u32) {
+        let level = self.ray.steep();
+        let sigma = if self.ray.is_steep() {
+            (level.value(rim) > 0.0).then(|| level.sigma(rim))
+        } else {
+            let [to_axis, from_axis] = [-1.0, 1.0].map(|sign| self.ray.shallow(sign));
+            let passes = (to_axis.value(rim) > 0.0) != (from_axis.value(rim) > 0.0);
+            // Between the two points over the rim, also where the height hardly tells where.
+            let over = (to_axis.sigma(rim), from_axis.sigma(rim));
+            (passes && rim.x >= self.ray.b).then(|| level.sigma(rim).clamp(over.0, over.1))
+        };
+        if let Some(sigma) = sigma
+            && sigma > self.from
+            && sigma < self.to
+        {
+            (self.to, self.face) = (sigma, Some(face));
+        }
+    }
+}
+
+fn end_of<S: Side>(side: &S, u: f64, p: DVec2, direction: DVec2) -> End {
+    End { u, p, direction, value: side.value(p), beta: side.beta(p) }
+}
+
+/// How the value of a side changes between two ends: `α·r' − β·y'` for all directions and slopes there.
+struct Change {
+    /// Whether it is of one sign.
+    one_way: bool,
+    /// Its greatest size.
+    greatest: f64,
+}
+
+impl Change {
+    #[inline]
+    fn between(alpha: f64, a: &End, b: &End) -> Self {
+        let change = |direction: DVec2, beta: f64| alpha * direction.x - beta * direction.y;
+        // Linear in the direction and in the slope: its extremes are in the corners.
+        let corners = [
+            change(a.direction, a.beta),
+            change(a.direction, b.beta),
+            change(b.direction, a.beta),
+            change(b.direction, b.beta),
+        ];
+        let least = corners.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Self { one_way: least > 0.0 || most < 0.0, greatest: most.max(-least) }
+    }
+}

@@ -1,0 +1,276 @@
+//! A ray in the half plane (radius, height), where a surface of revolution is its profile.
+//!
+//! With `σ` the length along the ray, its height is `y = o + δ·σ`, and horizontally it passes the axis at the
+//! distance `b`, from where it is `q = c + w·σ` away along its direction: its radius is `ρ = √(b² + q²)` (Kajiya 1983, "New
+//! Techniques for Ray Tracing Procedurally Defined Objects", section 4; van Wijk 1984, "Ray Tracing Objects Defined by Sweeping
+//! a Sphere", for the reduction to the plane). This is one branch of a hyperbola, which the profile crosses where the ray
+//! meets the surface. Which side of it a point is on is told in one of two ways, each free of cancellation where it is
+//! used and continuous in the slope `δ/w`, 0 included:
+//!
+//! * [`Steep`], `|δ| ≥ w`: by the radius, `r − ρ(y)`, with `q = c + (w/δ)·(y − o)`;
+//! * [`Shallow`], `|δ| < w`: by the height, `o + (δ/w)·(±√(r² − b²) − c) − y`, once for either sign, the way to the axis and the
+//!   way from there, which for level rays are one line.
+//!
+//! Multiplied out, both give Kajiya's polynomial of degree 6, in which the two ways of a nearly level ray are a
+//! double root.
+
+use crate::math::{Jet, Ring};
+use crate::shape::LocalRay;
+use glam::{DVec2, DVec3};
+
+/// A ray with a unit direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Meridian {
+    /// Height at σ = 0.
+    pub(super) o: f64,
+    /// Height per length.
+    pub(super) slope: f64,
+    inverse_slope: f64,
+    /// Signed horizontal distance from the closest approach to the axis, at σ = 0 …
+    pub(super) c: f64,
+    /// … and per length.
+    pub(super) w: f64,
+    /// Horizontal distance of the closest approach.
+    pub(super) b: f64,
+}
+
+impl Meridian {
+    pub(super) fn new(ray: &LocalRay) -> Self {
+        let (p, d) = (ray.o, ray.d);
+        let w = d.x.hypot(d.z);
+        // A ray along the axis has the same radius everywhere: any horizontal direction will do.
+        let along = DVec2::new(d.x, d.z) / w;
+        let along = if w > 0.0 { along } else { DVec2::new(p.x, p.z).normalize_or(DVec2::X) };
+        let across = DVec2::new(p.x, p.z);
+        Self {
+            o: p.y,
+            slope: d.y,
+            inverse_slope: 1.0 / d.y,
+            c: across.dot(along),
+            w,
+            b: across.perp_dot(along).abs(),
+        }
+    }
+
+    /// Where the ray may be inside a ring: a part of `from..to`.
+    #[inline]
+    pub(super) fn inside(&self, ring: &Ring, from: f64, to: f64) -> Option<(f64, f64)> {
+        // A level ray has infinite ends, of unlike signs if it is between the heights; no 0·∞, for rings are
+        // larger than what is in them by more than rounding.
+        let low = (ring.heights[0] - self.o) * self.inverse_slope;
+        let high = (ring.heights[1] - self.o) * self.inverse_slope;
+        let (enter, leave) = (low.min(high).max(from), low.max(high).min(to));
+        let (a, b) = (self.c + self.w * enter, self.c + self.w * leave);
+        let (a2, b2) = (a * a, b * b);
+        let nearest = if a * b <= 0.0 { 0.0 } else { a2.min(b2) };
+        let passed = self.b * self.b;
+        let meets = enter <= leave
+            && passed + a2.max(b2) >= ring.radii_squared[0]
+            && passed + nearest <= ring.radii_squared[1];
+        meets.then_some((enter, leave))
+    }
+
+    /// Signed distance from the closest approach at a length along the ray.
+    pub(super) fn q(&self, sigma: f64) -> f64 {
+        self.c + self.w * sigma
+    }
+
+    pub(super) fn is_steep(&self) -> bool {
+        self.slope.abs() >= self.w
+    }
+
+    pub(super) fn steep(&self) -> Steep {
+        Steep {
+            o: self.o,
+            c: self.c,
+            k: self.w * self.inverse_slope,
+            b2: self.b * self.b,
+            inverse_slope: self.inverse_slope,
+        }
+    }
+
+    /// On the way to the axis (`sign` −1) or from there (1).
+    pub(super) fn shallow(&self, sign: f64) -> Shallow {
+        let kappa = self.slope / self.w;
+        let axis = self.o - kappa * self.c;
+        Shallow {
+            axis,
+            kappa: kappa * sign,
+            sign,
+            b: self.b,
+            c: self.c,
+            inverse_w: 1.0 / self.w,
+            o: self.o,
+            inverse_slope: self.inverse_slope,
+        }
+    }
+}
+
+/// An end of a part of a piece.
+#[derive(Clone, Copy)]
+pub(super) struct End {
+    /// Parameter of the piece.
+    pub(super) u: f64,
+    pub(super) p: DVec2,
+    /// Unit direction of the piece.
+    pub(super) direction: DVec2,
+    /// [`Side::value`].
+    pub(super) value: f64,
+    /// [`Side::beta`].
+    pub(super) beta: f64,
+}
+
+/// On which side of a ray points of the half plane are.
+pub(super) trait Side {
+    /// The ray has no points with a smaller radius.
+    fn least_radius(&self) -> f64;
+    /// Positive on one side, negative on the other.
+    fn value(&self, p: DVec2) -> f64;
+    /// The value changes along a direction `(r', y')` by a positive multiple of `α·r' − β·y'`. This is `α` …
+    fn alpha(&self) -> f64;
+    /// … and this `β`, which changes one way along both coordinates.
+    fn beta(&self, p: DVec2) -> f64;
+    /// Bound between two ends of the change of the value by the length of the way, from one of `α·r' − β·y'`.
+    fn rate(&self, change: f64, a: &End, b: &End) -> f64;
+    /// The value along a curve, and its derivative.
+    fn along(&self, jet: &Jet) -> (f64, f64);
+    /// Length along the ray where it is at a point of its own.
+    fn sigma(&self, p: DVec2) -> f64;
+}
+
+/// A ray which is at each height once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Steep {
+    o: f64,
+    c: f64,
+    /// `w/δ`, in [−1, 1].
+    k: f64,
+    b2: f64,
+    inverse_slope: f64,
+}
+
+impl Steep {
+    #[inline]
+    fn q(&self, y: f64) -> f64 {
+        self.c + self.k * (y - self.o)
+    }
+}
+
+impl Side for Steep {
+    fn least_radius(&self) -> f64 {
+        0.0
+    }
+
+    #[inline]
+    fn value(&self, p: DVec2) -> f64 {
+        let q = self.q(p.y);
+        p.x - (self.b2 + q * q).sqrt()
+    }
+
+    fn alpha(&self) -> f64 {
+        1.0
+    }
+
+    /// `dρ/dy = k·q/ρ`.
+    #[inline]
+    fn beta(&self, p: DVec2) -> f64 {
+        let q = self.q(p.y);
+        let rho = (self.b2 + q * q).sqrt();
+        if rho > 0.0 { self.k * (q / rho) } else { 0.0 }
+    }
+
+    fn rate(&self, change: f64, _: &End, _: &End) -> f64 {
+        change
+    }
+
+    #[inline]
+    fn along(&self, jet: &Jet) -> (f64, f64) {
+        let q = self.q(jet.p.y);
+        let rho = (self.b2 + q * q).sqrt();
+        let beta = if rho > 0.0 { self.k * (q / rho) } else { 0.0 };
+        (jet.p.x - rho, jet.d.x - beta * jet.d.y)
+    }
+
+    #[inline]
+    fn sigma(&self, p: DVec2) -> f64 {
+        (p.y - self.o) * self.inverse_slope
+    }
+}
+
+/// One of the two ways of a ray which is at each radius twice.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shallow {
+    /// Height at the closest approach.
+    axis: f64,
+    /// Height per `|q|`, in (−1, 1).
+    kappa: f64,
+    sign: f64,
+    b: f64,
+    c: f64,
+    inverse_w: f64,
+    o: f64,
+    inverse_slope: f64,
+}
+
+impl Shallow {
+    /// `|q|` at a radius.
+    #[inline]
+    fn distance(&self, r: f64) -> f64 {
+        ((r - self.b) * (r + self.b)).max(0.0).sqrt()
+    }
+}
+
+impl Side for Shallow {
+    fn least_radius(&self) -> f64 {
+        self.b
+    }
+
+    #[inline]
+    fn value(&self, p: DVec2) -> f64 {
+        self.axis + self.kappa * self.distance(p.x) - p.y
+    }
+
+    fn alpha(&self) -> f64 {
+        self.kappa
+    }
+
+    /// `dr/d|q| = |q|/r`.
+    #[inline]
+    fn beta(&self, p: DVec2) -> f64 {
+        if p.x > self.b { self.distance(p.x) / p.x } else { 0.0 }
+    }
+
+    /// `κ·r/|q|·r' − y'`: infinite at the closest approach.
+    fn rate(&self, change: f64, a: &End, b: &End) -> f64 {
+        change / a.beta.min(b.beta)
+    }
+
+    #[inline]
+    fn along(&self, jet: &Jet) -> (f64, f64) {
+        let distance = self.distance(jet.p.x);
+        let value = self.axis + self.kappa * distance - jet.p.y;
+        (value, self.kappa * (jet.p.x / distance) * jet.d.x - jet.d.y)
+    }
+
+    /// An error `e` of the radius is one of `e·r/(|q|·w)` of the length, one of the height `e/|δ|`.
+    #[inline]
+    fn sigma(&self, p: DVec2) -> f64 {
+        let distance = self.distance(p.x);
+        if distance >= self.kappa.abs() * p.x {
+            (self.sign * distance - self.c) * self.inverse_w
+        } else {
+            (p.y - self.o) * self.inverse_slope
+        }
+    }
+}
+
+/// The ray, seen from where it is nearest to a point of the axis, with a unit direction; the length of its direction, and how
+/// far its origin was moved, in units of length.
+///
+/// Coordinates are then of the size of the shape instead of its distance.
+pub(super) fn recentred(ray: &LocalRay, height: f64) -> (LocalRay, f64, f64) {
+    let length = ray.d.length();
+    let d = ray.d / length;
+    let shift = (DVec3::Y * height - ray.o).dot(d);
+    (LocalRay { o: ray.o + d * shift, d }, length, shift)
+}
