@@ -1,11 +1,11 @@
-//! How fast the renderer is, in one table: rays, builds, samples, frames, and how they grow.
+//! How fast the renderer is, in one table: rays, surfaces of revolution, builds, samples, frames, and how they grow.
 //!
 //! `cargo bench --bench speed` runs everything but the convergence; after `--`:
 //!
 //! ```text
 //! --quick         smaller meshes, fewer repetitions
 //! --json FILE     the same numbers by the same names
-//! --only A,B      of rays, build, samples, frame, growth
+//! --only A,B      of rays, revolution, build, samples, frame, growth
 //! --convergence   CPU-seconds of whole renders to a relMSE of 1e-3, and their memory
 //! ```
 //!
@@ -19,6 +19,7 @@ mod frames;
 mod growth;
 mod rays;
 mod report;
+mod revolution;
 mod samples;
 
 #[path = "../common/mod.rs"]
@@ -82,8 +83,9 @@ fn main() -> ExitCode {
         }
     };
     let mut report = Report::default();
-    let sections: [(&str, fn(&Options, &mut Report)); 5] = [
+    let sections: [(&str, fn(&Options, &mut Report)); 6] = [
         ("rays", rays::run),
+        ("revolution", revolution::run),
         ("build", builds::run),
         ("samples", samples::run),
         ("frame", frames::run),

@@ -192,11 +192,13 @@ impl Primitive {
     /// The area of the shape in the world, square metres; infinite for a plane.
     ///
     /// The mean of the map's area factor over the surface: exact where it is constant on a face,
-    /// otherwise a rule of 256² points, good to about six digits.
+    /// otherwise a rule of 256² points, good to about six digits; of a revolution, of Gauss's points along its profile.
     pub fn world_area(&self, world_from_shape: &DAffine3) -> f64 {
         const N: u32 = 256;
-        if *self == Self::Plane {
-            return f64::INFINITY;
+        match self {
+            Self::Plane => return f64::INFINITY,
+            Self::Revolution(revolution) => return revolution.world_area(world_from_shape),
+            _ => {}
         }
         let flat = matches!(self, Self::Rectangle | Self::Disk);
         let n = if flat { 1 } else { N };

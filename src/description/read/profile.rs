@@ -1,24 +1,58 @@
 //! Surfaces of revolution: the numbers of their profiles, and where a profile goes wrong.
 
+use super::Names;
 use super::decode::{Report, decode};
 use super::limits::{self, COORDINATE, WEIGHT};
+use super::outline::{self, Kind};
 use super::source::Cursor;
-use crate::description::{Curve, CurveError};
-use crate::math::ProfileError;
+use super::surface::reference;
+use crate::description::{Curve, CurveError, Shape};
+use crate::math::{Profile, ProfileError};
+use serde::Deserialize;
+use std::sync::Arc;
 
 /// Points of a profile at most: each takes about a kilobyte when it is made ready for rays.
 const MAX_POINTS: usize = 65_536;
 
-/// Checks the profile of a surface of revolution; true when it can be made.
-pub(super) fn check_profile(shape: &Cursor, report: &mut Report) -> bool {
-    // Where it is missing, decoding the shape tells.
-    let Some(cursor) = shape.field("profile") else { return true };
-    let Some(curve) = decode::<Curve>(&cursor, report) else { return false };
+/// A surface of revolution as a scene file says it, its profile given there or by name.
+#[derive(Deserialize)]
+#[serde(rename = "Revolution", deny_unknown_fields)]
+struct RevolutionFile<P> {
+    #[serde(rename = "profile")]
+    _profile: P,
+    #[serde(default)]
+    capped: bool,
+}
+
+/// Reads a surface of revolution and checks it.
+pub(super) fn read_revolution(
+    cursor: &Cursor,
+    names: &Names,
+    report: &mut Report,
+) -> Option<Shape<String>> {
+    let place = cursor.field("profile");
+    if let Some(place) = place.as_ref().filter(|place| place.node.kind == Kind::Text) {
+        let file = decode::<RevolutionFile<String>>(cursor, report)?;
+        let name = outline::unquoted(place.text());
+        if names.complete {
+            reference(report, place, &name, &names.profiles, "profile", "profiles");
+        }
+        let profile = names.made.get(&name)?.clone();
+        return Some(Shape::Revolution { profile, capped: file.capped });
+    }
+    let file = decode::<RevolutionFile<Curve>>(cursor, report)?;
+    let profile = read_profile(&place?, report)?;
+    Some(Shape::Revolution { profile, capped: file.capped })
+}
+
+/// Reads a profile and checks it.
+pub(super) fn read_profile(cursor: &Cursor, report: &mut Report) -> Option<Arc<Profile>> {
+    let curve = decode::<Curve>(cursor, report)?;
     let list = cursor.at("points");
     if curve.points().len() > MAX_POINTS {
         let message = format!("a profile has at most {MAX_POINTS} points");
         report.at("scene::profile", &list, message);
-        return false;
+        return None;
     }
     let mut fine = true;
     for (index, point) in curve.points().iter().enumerate() {
@@ -31,11 +65,11 @@ pub(super) fn check_profile(shape: &Cursor, report: &mut Report) -> bool {
     };
     fine &= limits::vector(report, &cursor.at("weights"), weights, &WEIGHT);
     fine &= limits::vector(report, &cursor.at("knots"), knots, &COORDINATE);
-    if fine && let Err(error) = curve.profile() {
-        tell(&error, &curve, &cursor, report);
-        return false;
+    if !fine {
+        return None;
     }
-    fine
+    let made = curve.profile();
+    made.map(Arc::new).map_err(|error| tell(&error, &curve, cursor, report)).ok()
 }
 
 fn tell(error: &CurveError, curve: &Curve, cursor: &Cursor, report: &mut Report) {

@@ -8,8 +8,10 @@ use crate::description::diagnostic::{Diagnostic, Diagnostics, Severity, suggesti
 use crate::description::{
     EmissionStrength, Light, Material, SceneDescription, Shape, Texture, Value,
 };
+use crate::math::Profile;
 use indexmap::IndexMap;
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Reports entities which are their own ancestors, and materials made of themselves.
 pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
@@ -181,8 +183,16 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
     let mut used = HashSet::new();
     for entity in scene.entities.values() {
         used.extend(entity.material.iter().map(|name| ("material", name.clone())));
-        if let Some(Shape::Mesh(name)) = &entity.shape {
-            used.insert(("mesh", name.clone()));
+        match &entity.shape {
+            Some(Shape::Mesh(name)) => {
+                used.insert(("mesh", name.clone()));
+            }
+            Some(Shape::Revolution { profile, .. }) => {
+                let is_it = |made: &&Arc<Profile>| Arc::ptr_eq(made, profile);
+                let name = names.made.iter().find(|(_, made)| is_it(made));
+                used.extend(name.map(|(name, _)| ("profile", name.clone())));
+            }
+            _ => {}
         }
         let emitted = entity.emission.as_ref().and_then(|emission| match &emission.strength {
             EmissionStrength::Radiance(value) => value.texture(),
@@ -220,8 +230,12 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
         }
     }
     let mut warnings = Vec::new();
-    let kinds =
-        [("texture", &names.textures), ("material", &names.materials), ("mesh", &names.meshes)];
+    let kinds = [
+        ("texture", &names.textures),
+        ("material", &names.materials),
+        ("profile", &names.profiles),
+        ("mesh", &names.meshes),
+    ];
     for (kind, defined) in kinds {
         for (name, cursor) in defined {
             if !used.contains(&(kind, name.clone())) {

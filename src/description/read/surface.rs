@@ -3,7 +3,7 @@
 use super::Names;
 use super::decode::{Report, decode};
 use super::limits::{self, Limits};
-use super::profile::check_profile;
+use super::profile::read_revolution;
 use super::source::Cursor;
 use crate::description::diagnostic::suggestion;
 use crate::description::{
@@ -264,8 +264,8 @@ pub(super) fn read_shape(
     names: &Names,
     report: &mut Report,
 ) -> Option<Shape<String>> {
-    if cursor.name() == "Revolution" && !check_profile(cursor, report) {
-        return None;
+    if cursor.name() == "Revolution" {
+        return read_revolution(cursor, names, report);
     }
     let shape: Shape<String> = decode(cursor, report)?;
     let length = &limits::LENGTH;

@@ -29,9 +29,10 @@ pub struct Piece {
     pub v: (f64, f64),
     /// Area of the surface that it turns into.
     pub area: f64,
-    /// Coefficients of the powers of `u`, homogeneous.
-    powers: [DVec3; 4],
-    polynomial: bool,
+    /// Coefficients of the powers of `u`: of the point times its weight …
+    powers: [DVec2; 4],
+    /// … and of the weight; `None` where that is 1.
+    weights: Option<[f64; 4]>,
 }
 
 /// Point and derivative.
@@ -51,10 +52,11 @@ impl Piece {
         } else {
             cut.curve.0
         };
-        let powers =
-            [a, (b - a) * 3.0, ((a - b) + (c - b)) * 3.0, (d - a) + (b - c) * 3.0];
+        let powers = [a, (b - a) * 3.0, ((a - b) + (c - b)) * 3.0, (d - a) + (b - c) * 3.0];
+        let weights = (!polynomial).then(|| powers.map(|p| p.z));
+        let powers = powers.map(DVec3::truncate);
         let mut piece =
-            Self { start, end, directions: cut.directions, v, area: 0.0, powers, polynomial };
+            Self { start, end, directions: cut.directions, v, area: 0.0, powers, weights };
         piece.area = piece.area_up_to(1.0);
         piece
     }
@@ -65,11 +67,11 @@ impl Piece {
         let [a, b, c, d] = self.powers;
         let p = ((d * u + c) * u + b) * u + a;
         let dp = (d * (3.0 * u) + c * 2.0) * u + b;
-        if self.polynomial {
-            return Jet { p: p.truncate(), d: dp.truncate() };
-        }
-        let point = p.truncate() / p.z;
-        Jet { p: point, d: (dp.truncate() - point * dp.z) / p.z }
+        let Some([a, b, c, d]) = self.weights else { return Jet { p, d: dp } };
+        let w = ((d * u + c) * u + b) * u + a;
+        let dw = (d * (3.0 * u) + c * 2.0) * u + b;
+        let point = p / w;
+        Jet { p: point, d: (dp - point * dw) / w }
     }
 
     /// The unit direction at `u`, also where the derivative vanishes.
@@ -92,7 +94,8 @@ impl Piece {
         }
         bracketed_root((0.0, 1.0), (from, to), |u| {
             let jet = self.jet(u);
-            (jet.p[axis] - p[axis], jet.d[axis])
+            let value = jet.p[axis] - p[axis];
+            (value, value / jet.d[axis])
         })
     }
 
@@ -101,8 +104,8 @@ impl Piece {
         TAU * self.integral(u, |jet| jet.p.x.max(0.0) * jet.d.length())
     }
 
-    /// The integral of a function from 0 to `u`.
-    pub(super) fn integral(&self, u: f64, f: impl Fn(Jet) -> f64) -> f64 {
+    /// The integral of a function from 0 to `u`, by Gauss's rule with 8 points.
+    pub fn integral(&self, u: f64, f: impl Fn(Jet) -> f64) -> f64 {
         u * GAUSS.iter().map(|(x, weight)| weight * f(self.jet(x * u))).sum::<f64>()
     }
 
@@ -117,12 +120,13 @@ impl Piece {
         }
         bracketed_root((0.0, 1.0), (-wanted, self.area - wanted), |u| {
             let jet = self.jet(u);
-            (self.area_up_to(u) - wanted, TAU * jet.p.x.max(0.0) * jet.d.length())
+            let value = self.area_up_to(u) - wanted;
+            (value, value / (TAU * jet.p.x.max(0.0) * jet.d.length()))
         })
     }
 }
 
-/// The root of `f` (value and derivative) between `low` and `high`, where it has the values `ends` of unlike
+/// The root of `f` (its value, and that over its derivative) between `low` and `high`, where it has the values `ends` of unlike
 /// signs, 0 counting as negative.
 ///
 /// Newton's steps, and halvings where they leave the bracket. Newton's error squares, up to the factor `f''/2f'`. For an `f`
@@ -143,22 +147,22 @@ pub fn bracketed_root(
     let secant = low + (high - low) * (at_low / (at_low - at_high));
     let mut u = if secant >= low && secant <= high { secant } else { f64::midpoint(low, high) };
     let mut width = high - low;
-    for step in 0..MAX_STEPS {
-        let (value, slope) = f(u);
+    for count in 0..MAX_STEPS {
+        let (value, step) = f(u);
         if (value > 0.0) == low_is_positive {
             low = u;
         } else {
             high = u;
         }
-        let newton = u - value / slope;
+        let newton = u - step;
         // Where Newton crawls along one end, every third step halves.
-        let crawls = step % 3 == 2 && high - low > 0.5 * width;
-        if step % 3 == 2 {
+        let crawls = count % 3 == 2 && high - low > 0.5 * width;
+        if count % 3 == 2 {
             width = high - low;
         }
         if newton >= low && newton <= high && !crawls {
             let room = (u - ends.0).min(ends.1 - u);
-            if (newton - u).abs() < LAST_STEP.min(SHARE * room) {
+            if step.abs() < LAST_STEP.min(SHARE * room) {
                 return newton;
             }
             u = newton;

@@ -143,7 +143,8 @@ impl Search<'_> {
             let ends = (piece.start.x - least, piece.end.x - least);
             let u = bracketed_root((0.0, 1.0), ends, |u| {
                 let jet = piece.jet(u);
-                (jet.p.x - least, jet.d.x)
+                let value = jet.p.x - least;
+                (value, value / jet.d.x)
             });
             end_of(side, u, DVec2::new(least, piece.jet(u).p.y), piece.direction(u))
         };

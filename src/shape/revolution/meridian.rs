@@ -59,13 +59,13 @@ impl Meridian {
         // larger than what is in them by more than rounding.
         let low = (ring.heights[0] - self.o) * self.inverse_slope;
         let high = (ring.heights[1] - self.o) * self.inverse_slope;
-        let (enter, leave) = (low.min(high).max(from), low.max(high).min(to));
+        let (enter, leave) = (larger(smaller(low, high), from), smaller(larger(low, high), to));
         let (a, b) = (self.c + self.w * enter, self.c + self.w * leave);
         let (a2, b2) = (a * a, b * b);
-        let nearest = if a * b <= 0.0 { 0.0 } else { a2.min(b2) };
+        let nearest = if a * b <= 0.0 { 0.0 } else { smaller(a2, b2) };
         let passed = self.b * self.b;
         let meets = enter <= leave
-            && passed + a2.max(b2) >= ring.radii_squared[0]
+            && passed + larger(a2, b2) >= ring.radii_squared[0]
             && passed + nearest <= ring.radii_squared[1];
         meets.then_some((enter, leave))
     }
@@ -132,7 +132,7 @@ pub(super) trait Side {
     fn beta(&self, p: DVec2) -> f64;
     /// Bound between two ends of the change of the value by the length of the way, from one of `α·r' − β·y'`.
     fn rate(&self, change: f64, a: &End, b: &End) -> f64;
-    /// The value along a curve, and its derivative.
+    /// The value along a curve, and that over its derivative.
     fn along(&self, jet: &Jet) -> (f64, f64);
     /// Length along the ray where it is at a point of its own.
     fn sigma(&self, p: DVec2) -> f64;
@@ -187,8 +187,8 @@ impl Side for Steep {
     fn along(&self, jet: &Jet) -> (f64, f64) {
         let q = self.q(jet.p.y);
         let rho = (self.b2 + q * q).sqrt();
-        let beta = if rho > 0.0 { self.k * (q / rho) } else { 0.0 };
-        (jet.p.x - rho, jet.d.x - beta * jet.d.y)
+        let value = jet.p.x - rho;
+        (value, value * rho / (rho * jet.d.x - self.k * q * jet.d.y))
     }
 
     #[inline]
@@ -249,7 +249,7 @@ impl Side for Shallow {
     fn along(&self, jet: &Jet) -> (f64, f64) {
         let distance = self.distance(jet.p.x);
         let value = self.axis + self.kappa * distance - jet.p.y;
-        (value, self.kappa * (jet.p.x / distance) * jet.d.x - jet.d.y)
+        (value, value * distance / (self.kappa * jet.p.x * jet.d.x - distance * jet.d.y))
     }
 
     /// An error `e` of the radius is one of `e·r/(|q|·w)` of the length, one of the height `e/|δ|`.
@@ -262,6 +262,18 @@ impl Side for Shallow {
             (p.y - self.o) * self.inverse_slope
         }
     }
+}
+
+/// The smaller of two numbers; unlike `f64::min`, one instruction, for it need not look for NaN.
+#[inline]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers.
+#[inline]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// The ray, seen from where it is nearest to a point of the axis, with a unit direction; the length of its direction, and how
