@@ -95,6 +95,7 @@ fn tell(error: &CurveError, curve: &Curve, cursor: &Cursor, report: &mut Report)
             let message = "this point or one after it is out of range".to_owned();
             (list.nth(first_point(curve, *segment)), message, None)
         }
+        CurveError::Profile(ProfileError::TooLong { .. }) => (list, error.to_string(), None),
         CurveError::Profile(ProfileError::Empty) => {
             let message = "no surface comes of this profile".to_owned();
             let help = "it needs points at different places, not all of them on the axis";

@@ -7,8 +7,10 @@
 
 mod cut;
 mod piece;
+mod rings;
 
 pub use piece::{Jet, Piece, bracketed_root};
+pub use rings::{Child, MARGIN, MAX_LEVELS, Rings, WIDTH};
 
 use super::Cubic;
 use glam::DVec2;
@@ -28,6 +30,12 @@ pub enum ProfileError {
         /// The least radius found.
         radius: f64,
     },
+    /// More pieces than the tree over them can hold.
+    #[error("the profile comes to {pieces} pieces, more than 262144")]
+    TooLong {
+        /// How many it comes to.
+        pieces: usize,
+    },
     /// A number which is not finite, or a weight which is not positive.
     #[error("segment {segment} of the profile has a point or a weight out of range")]
     OutOfRange {
@@ -36,26 +44,13 @@ pub enum ProfileError {
     },
 }
 
-/// A box of the tree over the pieces: what it holds turns into a ring with a rectangular section.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ring {
-    /// Lowest and greatest height, enlarged by [`Profile::error`].
-    pub heights: [f64; 2],
-    /// Squares of the least and the greatest radius, these enlarged likewise.
-    pub radii_squared: [f64; 2],
-    /// Index of the second child; the first follows the node. 0 for a leaf.
-    pub second: u32,
-    /// The piece of a leaf.
-    pub piece: u32,
-}
-
 /// A profile ready to be met by rays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     /// Its parts, in order; those on the axis are left out.
     pub pieces: Vec<Piece>,
     /// The tree over them, its root first.
-    pub rings: Vec<Ring>,
+    pub rings: Vec<Rings>,
     /// Where it begins and ends; `None` for both if that is one place, and for an end on the axis.
     pub open_ends: [Option<DVec2>; 2],
     /// Greatest radius, least and greatest height.
@@ -86,6 +81,9 @@ impl Profile {
         let size = points().fold(0.0_f64, |m, p| m.max(p.abs().max_element()));
         let tiny = ROUNDINGS * size;
         let chain = chained(segments, tiny)?;
+        if chain.len() > rings::MAX_PIECES {
+            return Err(ProfileError::TooLong { pieces: chain.len() });
+        }
         let (Some(first), Some(last)) = (chain.first(), chain.last()) else {
             return Err(ProfileError::Empty);
         };
@@ -115,10 +113,9 @@ impl Profile {
         for piece in &pieces {
             areas.push(areas[areas.len() - 1] + piece.area);
         }
-        let mut rings = Vec::with_capacity(2 * pieces.len() - 1);
-        lay_tree(&pieces, (0, pieces.len()), tiny, &mut rings);
         let volume = pieces.iter().map(Piece::volume).sum();
         let sphere = (middle, reach + 8.0 * tiny);
+        let rings = rings::tree(&pieces, sphere);
         Self { pieces, rings, open_ends, extent: (radius, [low, high]), sphere, areas, volume }
     }
 
@@ -141,7 +138,7 @@ impl Profile {
     /// Bytes held.
     pub fn memory(&self) -> usize {
         self.pieces.len() * (size_of::<Piece>() + size_of::<f64>())
-            + self.rings.len() * size_of::<Ring>()
+            + self.rings.len() * size_of::<Rings>()
     }
 }
 
@@ -179,26 +176,4 @@ fn chained(segments: &[Cubic], tiny: f64) -> Result<Vec<Piece>, ProfileError> {
         last.end = first;
     }
     Ok(pieces)
-}
-
-/// Writes the tree over the pieces of a range and returns the index of its root.
-fn lay_tree(
-    pieces: &[Piece],
-    (from, to): (usize, usize),
-    tiny: f64,
-    rings: &mut Vec<Ring>,
-) -> usize {
-    let index = rings.len();
-    let held = &pieces[from..to];
-    let corners = || held.iter().flat_map(|piece| [piece.start, piece.end]);
-    let least = corners().fold(DVec2::INFINITY, DVec2::min) - 2.0 * tiny;
-    let most = corners().fold(DVec2::NEG_INFINITY, DVec2::max) + 2.0 * tiny;
-    let radii_squared = [least.x.max(0.0).powi(2), most.x.powi(2)];
-    rings.push(Ring { heights: [least.y, most.y], radii_squared, second: 0, piece: from as u32 });
-    if to - from > 1 {
-        let middle = usize::midpoint(from, to);
-        lay_tree(pieces, (from, middle), tiny, rings);
-        rings[index].second = lay_tree(pieces, (middle, to), tiny, rings) as u32;
-    }
-    index
 }

@@ -11,12 +11,13 @@
 //! axis is crossed also by the ray along the axis.
 
 use super::meridian::{End, Meridian, Side, recentred};
-use crate::math::{Piece, Profile, Ring, bracketed_root};
+use crate::math::profile::{Child, MARGIN, MAX_LEVELS, WIDTH};
+use crate::math::{Piece, Profile, bracketed_root};
 use crate::shape::{LocalHit, LocalRay};
 use glam::DVec2;
 
-/// Pending rings: one for each level of the tree over at most 2³² pieces.
-const MAX_DEPTH: usize = 32;
+/// Pending rings: all but one of a node for each level of the deepest tree, and the last.
+const MAX_PENDING: usize = (WIDTH - 1) * MAX_LEVELS + 1;
 /// Halvings of a piece for one ray. Near a point of contact a few halves remain for each of the 53 bits of the
 /// parameter; more are only spent on a ray which lies in the surface.
 const MAX_HALVINGS: u32 = 8 * f64::MANTISSA_DIGITS;
@@ -69,66 +70,64 @@ pub(super) fn nearest(
 impl Search<'_> {
     /// Goes through the tree, nearer rings first.
     fn descend(&mut self) {
-        let rings = &self.profile.rings;
-        let mut stack = [(0_u32, 0.0_f64); MAX_DEPTH];
-        let mut depth = 0;
-        let Some((mut enter, mut leave)) = self.ray.inside(&rings[0], self.from, self.to) else {
-            return;
-        };
-        let mut index = 0;
-        loop {
-            let ring = &rings[index as usize];
-            let next = if ring.second == 0 {
-                self.piece(ring.piece, (enter, leave));
-                None
-            } else {
-                let first = self.ray.inside(&rings[index as usize + 1], self.from, self.to);
-                let second = self.ray.inside(&rings[ring.second as usize], self.from, self.to);
-                match (first, second) {
-                    (Some(a), Some(b)) => {
-                        let (near, far) = ((index + 1, a), (ring.second, b));
-                        let (near, far) = if b.0 < a.0 { (far, near) } else { (near, far) };
-                        stack[depth] = (far.0, far.1.0);
-                        depth += 1;
-                        Some(near)
-                    }
-                    (Some(a), None) => Some((index + 1, a)),
-                    (None, Some(b)) => Some((ring.second, b)),
-                    (None, None) => None,
+        let (middle, radius) = self.profile.sphere;
+        let inverse_unit = 1.0 / radius;
+        let narrow = self.ray.narrow(middle, inverse_unit);
+        // Rounded outwards: what is met first must not be lost.
+        let from = ((self.from * inverse_unit) as f32).next_down();
+        let mut to = ((self.to * inverse_unit) as f32).next_up();
+        // Where the ray enters a ring yet to be looked into, and what is in it.
+        let (mut enters, mut children) = ([0.0_f32; MAX_PENDING], [Child::default(); MAX_PENDING]);
+        let mut count = 1;
+        enters[0] = from;
+        while count > 0 {
+            count -= 1;
+            if enters[count] > to {
+                continue;
+            }
+            let child = children[count];
+            if child.is_piece() {
+                self.piece(child);
+                to = ((self.to * inverse_unit) as f32).next_up();
+                continue;
+            }
+            let rings = &self.profile.rings[child.index()];
+            let found = narrow.passages(rings, from, to);
+            let first = count;
+            for (ring, &enter) in found.enter.iter().enumerate() {
+                if enter == f32::INFINITY {
+                    continue;
                 }
-            };
-            let next = next.or_else(|| {
-                while depth > 0 {
-                    depth -= 1;
-                    let (index, enter) = stack[depth];
-                    if enter < self.to
-                        && let Some(part) =
-                            self.ray.inside(&rings[index as usize], self.from, self.to)
-                    {
-                        return Some((index, part));
-                    }
+                let child = rings.children[ring].on_ways(
+                    narrow.q(enter) <= MARGIN,
+                    narrow.q(found.leave[ring]) >= -MARGIN,
+                );
+                // In order, the nearest on top.
+                let mut place = count;
+                while place > first && enters[place - 1] < enter {
+                    (enters[place], children[place]) = (enters[place - 1], children[place - 1]);
+                    place -= 1;
                 }
-                None
-            });
-            let Some((found, part)) = next else { return };
-            index = found;
-            (enter, leave) = part;
+                (enters[place], children[place]) = (enter, child);
+                count += 1;
+            }
         }
     }
 
-    /// Asks a piece whose ring the ray is in between two lengths.
-    fn piece(&mut self, index: u32, (enter, leave): (f64, f64)) {
-        let piece = &self.profile.pieces[index as usize];
+    /// Asks a piece whose ring the ray passes.
+    fn piece(&mut self, child: Child) {
+        let index = child.index();
+        let piece = &self.profile.pieces[index];
         self.halvings = MAX_HALVINGS;
         if self.ray.is_steep() {
-            self.side(&self.ray.steep(), index, piece);
+            self.side(&self.ray.steep(), index as u32, piece);
             return;
         }
-        if self.ray.q(enter) <= 0.0 {
-            self.side(&self.ray.shallow(-1.0), index, piece);
+        if child.is_on_way_in() {
+            self.side(&self.ray.shallow(-1.0), index as u32, piece);
         }
-        if self.ray.q(leave) >= 0.0 {
-            self.side(&self.ray.shallow(1.0), index, piece);
+        if child.is_on_way_out() {
+            self.side(&self.ray.shallow(1.0), index as u32, piece);
         }
     }
 
@@ -163,7 +162,7 @@ impl Search<'_> {
         let change = Change::between(side.alpha(), &a, &b);
         let middle = f64::midpoint(a.u, b.u);
         if change.one_way || self.halvings == 0 || middle <= a.u || middle >= b.u {
-            if unlike {
+            if unlike && self.holds(side.level(a.p), side.level(b.p)) {
                 let values = (a.value, b.value);
                 let u = bracketed_root((a.u, b.u), values, |u| side.along(&piece.jet(u)));
                 let sigma = side.sigma(piece.jet(u).p);
@@ -182,18 +181,18 @@ impl Search<'_> {
         self.halvings -= 1;
         let m = end_of(side, middle, piece.jet(middle).p, piece.direction(middle));
         for (a, b) in [(a, m), (m, b)] {
-            if self.reaches(a.p, b.p) {
+            if self.ray.passes((a.p, b.p), self.margin, self.from, self.to) {
                 self.part(side, index, piece, a, b);
             }
         }
     }
 
-    /// Whether the ray may meet what lies in the ring between two points.
-    fn reaches(&self, a: DVec2, b: DVec2) -> bool {
-        let (least, most) = (a.min(b) - self.margin, a.max(b) + self.margin);
-        let radii_squared = [least.x.max(0.0).powi(2), most.x.powi(2)];
-        let ring = Ring { heights: [least.y, most.y], radii_squared, second: 0, piece: 0 };
-        self.ray.inside(&ring, self.from, self.to).is_some()
+    /// Whether a crossing between two lengths can be of interest. Of a radius near the closest approach the length is
+    /// known to the root of rounding, which is less than the margin of a ring.
+    #[inline]
+    fn holds(&self, a: f64, b: f64) -> bool {
+        let slack = self.profile.sphere.1 * f64::from(MARGIN);
+        a.max(b) + slack > self.from && a.min(b) - slack < self.to
     }
 
     /// Asks a disk, by the same sides of its rim as the piece that ends there.

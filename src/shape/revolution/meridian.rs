@@ -14,7 +14,8 @@
 //! Multiplied out, both give Kajiya's polynomial of degree 6, in which the two ways of a nearly level ray are a
 //! double root.
 
-use crate::math::{Jet, Ring};
+use crate::math::Jet;
+use crate::math::profile::{Rings, WIDTH};
 use crate::shape::LocalRay;
 use glam::{DVec2, DVec3};
 
@@ -26,6 +27,7 @@ pub(super) struct Meridian {
     /// Height per length.
     pub(super) slope: f64,
     inverse_slope: f64,
+    inverse_w: f64,
     /// Signed horizontal distance from the closest approach to the axis, at σ = 0 …
     pub(super) c: f64,
     /// … and per length.
@@ -37,42 +39,53 @@ pub(super) struct Meridian {
 impl Meridian {
     pub(super) fn new(ray: &LocalRay) -> Self {
         let (p, d) = (ray.o, ray.d);
-        let w = d.x.hypot(d.z);
+        // Where the squares vanish the ray has the direction of the axis, to within any rounding.
+        let w = (d.x * d.x + d.z * d.z).sqrt();
         // A ray along the axis has the same radius everywhere: any horizontal direction will do.
-        let along = DVec2::new(d.x, d.z) / w;
+        let inverse_w = 1.0 / w;
+        let along = DVec2::new(d.x, d.z) * inverse_w;
         let along = if w > 0.0 { along } else { DVec2::new(p.x, p.z).normalize_or(DVec2::X) };
         let across = DVec2::new(p.x, p.z);
         Self {
             o: p.y,
             slope: d.y,
             inverse_slope: 1.0 / d.y,
+            inverse_w,
             c: across.dot(along),
             w,
             b: across.perp_dot(along).abs(),
         }
     }
 
-    /// Where the ray may be inside a ring: a part of `from..to`.
+    /// Whether the ray may be in the ring between two points, enlarged by `margin`, within `from..to`.
     #[inline]
-    pub(super) fn inside(&self, ring: &Ring, from: f64, to: f64) -> Option<(f64, f64)> {
-        // A level ray has infinite ends, of unlike signs if it is between the heights; no 0·∞, for rings are
-        // larger than what is in them by more than rounding.
-        let low = (ring.heights[0] - self.o) * self.inverse_slope;
-        let high = (ring.heights[1] - self.o) * self.inverse_slope;
+    pub(super) fn passes(&self, (p, q): (DVec2, DVec2), margin: f64, from: f64, to: f64) -> bool {
+        let (least, most) = (p.min(q) - margin, p.max(q) + margin);
+        // A level ray has infinite ends, of unlike signs if it is between the heights; no 0·∞, for the ring is
+        // larger than what is in it by more than rounding.
+        let low = (least.y - self.o) * self.inverse_slope;
+        let high = (most.y - self.o) * self.inverse_slope;
         let (enter, leave) = (larger(smaller(low, high), from), smaller(larger(low, high), to));
         let (a, b) = (self.c + self.w * enter, self.c + self.w * leave);
         let (a2, b2) = (a * a, b * b);
         let nearest = if a * b <= 0.0 { 0.0 } else { smaller(a2, b2) };
-        let passed = self.b * self.b;
-        let meets = enter <= leave
-            && passed + larger(a2, b2) >= ring.radii_squared[0]
-            && passed + nearest <= ring.radii_squared[1];
-        meets.then_some((enter, leave))
+        let (passed, inner) = (self.b * self.b, least.x.max(0.0));
+        enter <= leave
+            && passed + larger(a2, b2) >= inner * inner
+            && passed + nearest <= most.x * most.x
     }
 
-    /// Signed distance from the closest approach at a length along the ray.
-    pub(super) fn q(&self, sigma: f64) -> f64 {
-        self.c + self.w * sigma
+    /// The ray as the tree of a profile sees it, whose middle has this height; with the inverse of the unit of the tree.
+    pub(super) fn narrow(&self, middle: f64, inverse_unit: f64) -> Narrow {
+        let unit = |x: f64| (x * inverse_unit) as f32;
+        let b = unit(self.b);
+        Narrow {
+            o: unit(self.o - middle),
+            inverse_slope: self.inverse_slope as f32,
+            c: unit(self.c),
+            w: self.w as f32,
+            b2: b * b,
+        }
     }
 
     pub(super) fn is_steep(&self) -> bool {
@@ -91,7 +104,7 @@ impl Meridian {
 
     /// On the way to the axis (`sign` −1) or from there (1).
     pub(super) fn shallow(&self, sign: f64) -> Shallow {
-        let kappa = self.slope / self.w;
+        let kappa = self.slope * self.inverse_w;
         let axis = self.o - kappa * self.c;
         Shallow {
             axis,
@@ -99,10 +112,57 @@ impl Meridian {
             sign,
             b: self.b,
             c: self.c,
-            inverse_w: 1.0 / self.w,
+            inverse_w: self.inverse_w,
             o: self.o,
             inverse_slope: self.inverse_slope,
         }
+    }
+}
+
+/// A ray as the tree of a profile sees it: in `f32`, in units of the sphere around the profile.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Narrow {
+    o: f32,
+    inverse_slope: f32,
+    c: f32,
+    w: f32,
+    b2: f32,
+}
+
+/// Between which lengths a ray may be inside of the rings of a node.
+pub(super) struct Passages {
+    /// Infinite where it cannot be inside.
+    pub(super) enter: [f32; WIDTH],
+    pub(super) leave: [f32; WIDTH],
+}
+
+impl Narrow {
+    /// The parts of `from..to` inside of the rings of a node: all in step, so that the compiler makes vectors of them.
+    #[inline]
+    pub(super) fn passages(&self, rings: &Rings, from: f32, to: f32) -> Passages {
+        let (mut enter, mut leave) = ([0.0; WIDTH], [0.0; WIDTH]);
+        for k in 0..WIDTH {
+            let low = (rings.low[k] - self.o) * self.inverse_slope;
+            let high = (rings.high[k] - self.o) * self.inverse_slope;
+            enter[k] = larger(smaller(low, high), from);
+            leave[k] = smaller(larger(low, high), to);
+        }
+        for k in 0..WIDTH {
+            let (a, b) = (self.q(enter[k]), self.q(leave[k]));
+            let (a2, b2) = (a * a, b * b);
+            let nearest = if a * b <= 0.0 { 0.0 } else { smaller(a2, b2) };
+            let meets = (enter[k] <= leave[k])
+                & (self.b2 + larger(a2, b2) >= rings.inner[k])
+                & (self.b2 + nearest <= rings.outer[k]);
+            enter[k] = if meets { enter[k] } else { f32::INFINITY };
+        }
+        Passages { enter, leave }
+    }
+
+    /// Signed distance from the closest approach at a length along the ray.
+    #[inline]
+    pub(super) fn q(&self, sigma: f32) -> f32 {
+        self.c + self.w * sigma
     }
 }
 
@@ -136,6 +196,8 @@ pub(super) trait Side {
     fn along(&self, jet: &Jet) -> (f64, f64);
     /// Length along the ray where it is at a point of its own.
     fn sigma(&self, p: DVec2) -> f64;
+    /// Length along the ray where it has the coordinate of a point which tells its ways apart: the height, or the radius.
+    fn level(&self, p: DVec2) -> f64;
 }
 
 /// A ray which is at each height once.
@@ -194,6 +256,11 @@ impl Side for Steep {
     #[inline]
     fn sigma(&self, p: DVec2) -> f64 {
         (p.y - self.o) * self.inverse_slope
+    }
+
+    #[inline]
+    fn level(&self, p: DVec2) -> f64 {
+        self.sigma(p)
     }
 }
 
@@ -262,17 +329,22 @@ impl Side for Shallow {
             (p.y - self.o) * self.inverse_slope
         }
     }
+
+    #[inline]
+    fn level(&self, p: DVec2) -> f64 {
+        (self.sign * self.distance(p.x) - self.c) * self.inverse_w
+    }
 }
 
-/// The smaller of two numbers; unlike `f64::min`, one instruction, for it need not look for NaN.
+/// The smaller of two numbers; unlike `min`, one instruction, for it need not look for NaN.
 #[inline]
-fn smaller(a: f64, b: f64) -> f64 {
+fn smaller<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
 /// The larger of two numbers.
 #[inline]
-fn larger(a: f64, b: f64) -> f64 {
+fn larger<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
