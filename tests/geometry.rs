@@ -82,20 +82,21 @@ fn turned(points: &[[f64; 2]]) -> Primitive {
 
 /// The last is the only one without bounds.
 fn primitives() -> Vec<Primitive> {
-    let curve = Cubic::new([[0.5, 0.0], [1.2, 0.3], [0.2, 0.9], [0.8, 1.2]].map(DVec2::from), [1.0; 4]);
+    let curve =
+        Cubic::new([[0.5, 0.0], [1.2, 0.3], [0.2, 0.9], [0.8, 1.2]].map(DVec2::from), [1.0; 4]);
     let vase = Profile::new(&[curve]).expect("off its axis");
     vec![
-    Primitive::Sphere,
-    Primitive::Rectangle,
-    Primitive::Disk,
-    Primitive::Cuboid,
-    Primitive::Cylinder { capped: true },
-    Primitive::Cylinder { capped: false },
-    Primitive::Cone { capped: true },
-    Primitive::Cone { capped: false },
-    Primitive::Revolution(Revolution::new(Arc::new(vase), false)),
-    turned(&[[0.4, -0.5], [0.8, 0.1], [0.3, 0.5]]),
-    Primitive::Plane,
+        Primitive::Sphere,
+        Primitive::Rectangle,
+        Primitive::Disk,
+        Primitive::Cuboid,
+        Primitive::Cylinder { capped: true },
+        Primitive::Cylinder { capped: false },
+        Primitive::Cone { capped: true },
+        Primitive::Cone { capped: false },
+        Primitive::Revolution(Revolution::new(Arc::new(vase), false)),
+        turned(&[[0.4, -0.5], [0.8, 0.1], [0.3, 0.5]]),
+        Primitive::Plane,
     ]
 }
 

@@ -12,9 +12,8 @@ use std::sync::Arc;
 
 /// A chain of curves through `3n + 1` points (radius, height).
 fn bezier(points: &[[f64; 2]]) -> Vec<Cubic> {
-    let curve = |k: usize| {
-        Cubic::new(std::array::from_fn(|i| DVec2::from(points[3 * k + i])), [1.0; 4])
-    };
+    let curve =
+        |k: usize| Cubic::new(std::array::from_fn(|i| DVec2::from(points[3 * k + i])), [1.0; 4]);
     (0..points.len() / 3).map(curve).collect()
 }
 
@@ -46,9 +45,10 @@ const CUSP: [[f64; 2]; 4] = [[0.3, 0.0], [1.3, 1.0], [0.3, 1.0], [1.3, 0.0]];
 
 /// Everything that is thrown rays at: by name, its curves, and whether its ends are closed.
 fn shapes() -> Vec<(&'static str, Vec<Cubic>, bool)> {
-    let loose: Vec<DVec2> = [[0.0, 0.0], [1.0, 0.1], [0.4, 0.6], [0.9, 1.0], [0.3, 1.5], [0.0, 1.4]]
-        .map(DVec2::from)
-        .to_vec();
+    let loose: Vec<DVec2> =
+        [[0.0, 0.0], [1.0, 0.1], [0.4, 0.6], [0.9, 1.0], [0.3, 1.5], [0.0, 1.4]]
+            .map(DVec2::from)
+            .to_vec();
     vec![
         ("vase", bezier(&VASE), false),
         ("closed vase", bezier(&VASE), true),
@@ -94,14 +94,24 @@ fn known_rays_meet_known_surfaces_where_they_should() {
     // There the axis is z, here it is y.
     let turn = |x: f64, y: f64, z: f64| DVec3::new(y, z, x);
     let cases = [
-        (&vase, turn(-2.0, 0.1, 0.4), turn(1.0, 0.05, 0.1), vec![1.313_855_429_98, 2.638_081_768_52]),
+        (
+            &vase,
+            turn(-2.0, 0.1, 0.4),
+            turn(1.0, 0.05, 0.1),
+            vec![1.313_855_429_98, 2.638_081_768_52],
+        ),
         (
             &vase,
             turn(0.6, 0.1, -1.0),
             turn(0.05, 0.02, 1.0),
             vec![1.103_723_644_15, 1.590_515_438_29, 2.156_225_810_99],
         ),
-        (&vase, turn(-2.0, 0.3, 0.4), turn(1.0, 0.0, 0.0), vec![1.310_820_291_37, 2.689_179_708_63]),
+        (
+            &vase,
+            turn(-2.0, 0.3, 0.4),
+            turn(1.0, 0.0, 0.0),
+            vec![1.310_820_291_37, 2.689_179_708_63],
+        ),
         (
             &vase,
             turn(0.65, 0.0, -1.0),
@@ -135,10 +145,8 @@ fn known_rays_meet_known_surfaces_where_they_should() {
         (1.313_855_429_98, turn(-0.915_517_9, 0.217_955_7, 0.338_115_8)),
         (2.638_081_768_52, turn(0.874_864_7, 0.325_164_8, 0.358_998_2)),
     ] {
-        let face = vase
-            .intersect(&LocalRay { o: o + d * (t - 0.01), d }, 1.0)
-            .expect("it is there")
-            .face;
+        let face =
+            vase.intersect(&LocalRay { o: o + d * (t - 0.01), d }, 1.0).expect("it is there").face;
         let n = vase.surface(o + d * t, face, true).ng.normalize();
         assert!(n.distance(normal) < 2e-7, "{n} instead of {normal}");
     }
@@ -229,11 +237,8 @@ impl Dense {
                 // Which coordinate tells better where on the ray a point is.
                 let along = |p: DVec2| {
                     let by_height = chord(p.x).max(0.0) < kappa.abs() * p.x;
-                    let way = if by_height {
-                        (p.y - near.y) / d.y
-                    } else {
-                        (sign * chord(p.x) - q0) / w
-                    };
+                    let way =
+                        if by_height { (p.y - near.y) / d.y } else { (sign * chord(p.x) - q0) / w };
                     shift + way
                 };
                 // NaN inside of the closest approach: no change of sign is seen there, and the
@@ -423,7 +428,8 @@ fn compare_with_oracle(rays_per_shape: u32, seed: u64) -> u32 {
             let expected = dense.nearest(o, d);
             thrown += 1;
             hits += u32::from(hit.is_some());
-            let tell = || format!("{name} × {scale}, ray {k}: {o:?} {d:?}: {t} instead of {expected}");
+            let tell =
+                || format!("{name} × {scale}, ray {k}: {o:?} {d:?}: {t} instead of {expected}");
             // Rounding moves the ray sideways by a few units in the last place of its coordinates.
             let graze = hit.map_or(0.0, |hit| {
                 resized[which].surface(ray.at(hit.t), hit.face, false).ng.normalize().dot(d).abs()
@@ -436,7 +442,11 @@ fn compare_with_oracle(rays_per_shape: u32, seed: u64) -> u32 {
             if t < expected {
                 between += 1;
                 let off = distance(&dense, o + d * t);
-                assert!(off < 4e-15 * dense.size * (1.0 + o.length() / dense.size), "ghost at {off:e}: {}", tell());
+                assert!(
+                    off < 4e-15 * dense.size * (1.0 + o.length() / dense.size),
+                    "ghost at {off:e}: {}",
+                    tell()
+                );
                 continue;
             }
             // Where the ray only touches, within rounding, either answer is right.
@@ -530,7 +540,8 @@ fn volume_by_chords(shape: &Primitive, radius: f64, rays: u32) -> f64 {
         let n = &mut Numbers::new(4, k);
         let o = DVec3::new(-10.0, (2.0 * n.next() - 1.0) * radius, (2.0 * n.next() - 1.0) * radius);
         let (mut at, mut inside) = (0.0, false);
-        while let Some(hit) = shape.intersect(&LocalRay { o: o + DVec3::X * at, d: DVec3::X }, 1e9) {
+        while let Some(hit) = shape.intersect(&LocalRay { o: o + DVec3::X * at, d: DVec3::X }, 1e9)
+        {
             sum += if inside { hit.t + 1e-9 } else { -1e-9 };
             inside = !inside;
             at += hit.t + 1e-9;
@@ -709,7 +720,9 @@ fn bad_profiles_are_errors_and_ugly_ones_are_surfaces() {
     let crossing = polyline(&[[1.0, 0.0], [0.5, 1.0], [-0.25, 2.0]]);
     assert_eq!(empty(&crossing), ProfileError::NegativeRadius { segment: 1, radius: -0.25 });
     let dips = bezier(&[[1.0, 0.0], [-2.0, 0.3], [-2.0, 0.6], [1.0, 1.0]]);
-    assert!(matches!(empty(&dips), ProfileError::NegativeRadius { segment: 0, radius } if radius < -1.0));
+    assert!(
+        matches!(empty(&dips), ProfileError::NegativeRadius { segment: 0, radius } if radius < -1.0)
+    );
     for bad in [f64::NAN, f64::INFINITY, -f64::INFINITY] {
         let curves = bezier(&[[1.0, 0.0], [1.0, bad], [1.0, 0.6], [1.0, 1.0]]);
         assert_eq!(empty(&curves), ProfileError::OutOfRange { segment: 0 });

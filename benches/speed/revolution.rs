@@ -18,12 +18,40 @@ use std::sync::Arc;
 
 /// Outside from the axis, rim, and inside of a glass, (radius, height) in millimetres.
 const GLASS: [[f64; 2]; 34] = [
-    [0.0, 0.8], [10.0, 0.8], [24.0, 0.0], [35.0, 0.0], [36.2, 0.0], [36.2, 1.6], [35.0, 1.8],
-    [20.0, 3.6], [6.5, 5.5], [4.6, 13.0], [3.4, 19.0], [3.4, 60.0], [3.8, 84.0], [4.6, 93.0],
-    [15.0, 93.5], [27.0, 104.0], [37.5, 113.0], [43.0, 126.0], [43.0, 142.0], [43.0, 168.0],
-    [36.5, 192.0], [33.0, 214.0], [32.8, 215.3], [31.9, 215.3], [31.8, 214.0], [35.2, 192.0],
-    [41.7, 168.0], [41.7, 142.0], [41.7, 127.0], [36.4, 114.2], [26.1, 105.4], [15.5, 97.0],
-    [7.0, 95.5], [0.0, 95.5],
+    [0.0, 0.8],
+    [10.0, 0.8],
+    [24.0, 0.0],
+    [35.0, 0.0],
+    [36.2, 0.0],
+    [36.2, 1.6],
+    [35.0, 1.8],
+    [20.0, 3.6],
+    [6.5, 5.5],
+    [4.6, 13.0],
+    [3.4, 19.0],
+    [3.4, 60.0],
+    [3.8, 84.0],
+    [4.6, 93.0],
+    [15.0, 93.5],
+    [27.0, 104.0],
+    [37.5, 113.0],
+    [43.0, 126.0],
+    [43.0, 142.0],
+    [43.0, 168.0],
+    [36.5, 192.0],
+    [33.0, 214.0],
+    [32.8, 215.3],
+    [31.9, 215.3],
+    [31.8, 214.0],
+    [35.2, 192.0],
+    [41.7, 168.0],
+    [41.7, 142.0],
+    [41.7, 127.0],
+    [36.4, 114.2],
+    [26.1, 105.4],
+    [15.5, 97.0],
+    [7.0, 95.5],
+    [0.0, 95.5],
 ];
 const HEIGHT: f64 = 0.215;
 
@@ -113,7 +141,9 @@ fn ray_sets(surface: &Primitive, side: usize) -> [(&'static str, Vec<LocalRay>);
 /// Measures the glass and its meshes in turn.
 pub fn run(options: &Options, report: &mut Report) {
     let (side, repetitions) = if options.quick { (512, 5) } else { (1024, 9) };
-    section("revolution: Mrays per CPU-second, and MB; meshes by their error in heights of the glass");
+    section(
+        "revolution: Mrays per CPU-second, and MB; meshes by their error in heights of the glass",
+    );
     let profile = profile();
     let errors = [1e-3, 1e-4, 1e-5];
     let meshes = errors.map(|error| mesh_within(&profile, error * HEIGHT));

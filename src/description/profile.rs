@@ -106,7 +106,10 @@ impl Curve {
                 let weights = padded(weights, found)?;
                 let curve = |k: usize| {
                     let at = |i: usize| 3 * k + i;
-                    Cubic::new([0, 1, 2, 3].map(|i| points[at(i)]), [0, 1, 2, 3].map(|i| weights[at(i)]))
+                    Cubic::new(
+                        [0, 1, 2, 3].map(|i| points[at(i)]),
+                        [0, 1, 2, 3].map(|i| weights[at(i)]),
+                    )
                 };
                 Ok((0..found / 3).map(curve).collect())
             }
@@ -168,7 +171,10 @@ fn check_knots(knots: &[f64], points: usize) -> Result<(), CurveError> {
     }
     let equal = |index: &usize| knots[*index] == knots[*index + 3];
     if let Some(index) = (1..points).find(equal) {
-        return Err(CurveError::Knot { index, what: "and three after it are equal: the curve breaks" });
+        return Err(CurveError::Knot {
+            index,
+            what: "and three after it are equal: the curve breaks",
+        });
     }
     Ok(())
 }
@@ -232,7 +238,10 @@ mod tests {
         let told = |error: &str| Err(error.to_owned());
         assert_eq!(
             Curve::Bezier { points: four[..3].to_vec(), weights: vec![] }.segments(),
-            Err(CurveError::Points { expected: "`Bezier` needs 3·n + 1 points (4, 7, 10, …)", found: 3 })
+            Err(CurveError::Points {
+                expected: "`Bezier` needs 3·n + 1 points (4, 7, 10, …)",
+                found: 3
+            })
         );
         assert_eq!(
             spline(&[1.0], &[], false),

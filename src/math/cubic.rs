@@ -114,9 +114,11 @@ mod tests {
         if degree == 0 {
             return f64::from(u8::from(knots[i] <= t && t < knots[i + 1]));
         }
-        let side = |from: f64, to: f64, x: f64| if to > from { (x - from) / (to - from) } else { 0.0 };
+        let side =
+            |from: f64, to: f64, x: f64| if to > from { (x - from) / (to - from) } else { 0.0 };
         side(knots[i], knots[i + degree], t) * basis(knots, i, degree - 1, t)
-            + (knots[i + degree + 1] - t).max(0.0) / (knots[i + degree + 1] - knots[i + 1]).max(1e-300)
+            + (knots[i + degree + 1] - t).max(0.0)
+                / (knots[i + degree + 1] - knots[i + 1]).max(1e-300)
                 * basis(knots, i + 1, degree - 1, t)
     }
 

@@ -68,7 +68,14 @@ pub struct LocalSurface {
 
 impl LocalSurface {
     fn smooth(p: DVec3, normal: DVec3, uv: (f64, f64), dpdu: DVec3) -> Self {
-        Self { p, ng: normal, ns: normal, uv: Vec2::new(uv.0 as f32, uv.1 as f32), dpdu, error: 0.0 }
+        Self {
+            p,
+            ng: normal,
+            ns: normal,
+            uv: Vec2::new(uv.0 as f32, uv.1 as f32),
+            dpdu,
+            error: 0.0,
+        }
     }
 }
 

@@ -112,7 +112,8 @@ fn first_point(curve: &Curve, segment: usize) -> usize {
         Curve::Bezier { .. } => 3 * segment,
         Curve::Spline { points, knots, .. } => {
             // Segments are the intervals of knots which are not empty.
-            let intervals = (3..points.len()).filter(|&k| knots.is_empty() || knots[k] < knots[k + 1]);
+            let intervals =
+                (3..points.len()).filter(|&k| knots.is_empty() || knots[k] < knots[k + 1]);
             intervals.map(|k| k - 3).nth(segment).unwrap_or(0)
         }
     }

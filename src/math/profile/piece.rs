@@ -47,11 +47,8 @@ pub struct Jet {
 impl Piece {
     pub(super) fn new(cut: &Cut, start: DVec2, end: DVec2, v: (f64, f64)) -> Self {
         let polynomial = cut.curve.is_polynomial();
-        let [a, b, c, d] = if polynomial {
-            cut.curve.points().map(|p| p.extend(1.0))
-        } else {
-            cut.curve.0
-        };
+        let [a, b, c, d] =
+            if polynomial { cut.curve.points().map(|p| p.extend(1.0)) } else { cut.curve.0 };
         let powers = [a, (b - a) * 3.0, ((a - b) + (c - b)) * 3.0, (d - a) + (b - c) * 3.0];
         let weights = (!polynomial).then(|| powers.map(|p| p.z));
         let powers = powers.map(DVec3::truncate);

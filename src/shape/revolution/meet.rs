@@ -55,8 +55,7 @@ pub(super) fn nearest(
     }
     let meridian = Meridian::new(&near);
     let margin = profile.error();
-    let mut search =
-        Search { profile, ray: meridian, from, to, face: None, margin, halvings: 0 };
+    let mut search = Search { profile, ray: meridian, from, to, face: None, margin, halvings: 0 };
     search.descend();
     for (end, rim) in caps.into_iter().enumerate() {
         if let Some(rim) = rim {
@@ -98,10 +97,8 @@ impl Search<'_> {
                 if enter == f32::INFINITY {
                     continue;
                 }
-                let child = rings.children[ring].on_ways(
-                    narrow.q(enter) <= MARGIN,
-                    narrow.q(found.leave[ring]) >= -MARGIN,
-                );
+                let child = rings.children[ring]
+                    .on_ways(narrow.q(enter) <= MARGIN, narrow.q(found.leave[ring]) >= -MARGIN);
                 // In order, the nearest on top.
                 let mut place = count;
                 while place > first && enters[place - 1] < enter {
@@ -157,25 +154,52 @@ impl Search<'_> {
     }
 
     /// Looks for crossings of a part of a piece.
+    #[inline]
     fn part<S: Side>(&mut self, side: &S, index: u32, piece: &Piece, a: End, b: End) {
-        let unlike = (a.value > 0.0) != (b.value > 0.0);
         let change = Change::between(side.alpha(), &a, &b);
-        let middle = f64::midpoint(a.u, b.u);
-        if change.one_way || self.halvings == 0 || middle <= a.u || middle >= b.u {
-            if unlike && self.holds(side.level(a.p), side.level(b.p)) {
-                let values = (a.value, b.value);
-                let u = bracketed_root((a.u, b.u), values, |u| side.along(&piece.jet(u)));
-                let sigma = side.sigma(piece.jet(u).p);
-                if sigma > self.from && sigma < self.to {
-                    (self.to, self.face) = (sigma, Some(index));
-                }
+        if change.one_way {
+            self.crossing(side, index, piece, &a, &b);
+        } else {
+            self.halves(side, index, piece, a, b, change.greatest);
+        }
+    }
+
+    /// Takes the crossing between two ends, if there is one.
+    #[inline]
+    fn crossing<S: Side>(&mut self, side: &S, index: u32, piece: &Piece, a: &End, b: &End) {
+        let unlike = (a.value > 0.0) != (b.value > 0.0);
+        if unlike && self.holds(side.level(a.p), side.level(b.p)) {
+            let values = (a.value, b.value);
+            let u = bracketed_root((a.u, b.u), values, |u| side.along(&piece.jet(u)));
+            let sigma = side.sigma(piece.jet(u).p);
+            if sigma > self.from && sigma < self.to {
+                (self.to, self.face) = (sigma, Some(index));
             }
+        }
+    }
+
+    /// Looks for crossings of both halves of a part along which the side may change both ways, by at most `greatest`
+    /// for each length.
+    #[inline(never)]
+    fn halves<S: Side>(
+        &mut self,
+        side: &S,
+        index: u32,
+        piece: &Piece,
+        a: End,
+        b: End,
+        greatest: f64,
+    ) {
+        let middle = f64::midpoint(a.u, b.u);
+        if self.halvings == 0 || middle <= a.u || middle >= b.u {
+            self.crossing(side, index, piece, &a, &b);
             return;
         }
         // Both ends are too far from 0 to get there and back. The way along a monotone curve is no longer than
         // along the sides of its box.
         let way = (b.p - a.p).abs().element_sum();
-        if !unlike && (a.value + b.value).abs() > side.rate(change.greatest, &a, &b) * way {
+        let unlike = (a.value > 0.0) != (b.value > 0.0);
+        if !unlike && (a.value + b.value).abs() > side.rate(greatest, &a, &b) * way {
             return;
         }
         self.halvings -= 1;

@@ -77,7 +77,7 @@ impl Revolution {
             return LocalSurface { error, ..self.disk(p, rim, end) };
         }
         let piece = &self.profile.pieces[(face as usize).min(count - 1)];
-        let radius = p.x.hypot(p.z);
+        let radius = (p.x * p.x + p.z * p.z).sqrt();
         let u = piece.parameter_of(DVec2::new(radius, p.y));
         let on_profile = piece.jet(u).p;
         let radial = DVec3::new(p.x, 0.0, p.z).normalize_or(DVec3::Z);
@@ -112,7 +112,8 @@ impl Revolution {
             if let Some(rim) = self.cap(end)
                 && wanted < area
             {
-                let disk = square_to_disk(Vec2::new((wanted / area) as f32, u.y)).as_dvec2() * rim.x;
+                let disk =
+                    square_to_disk(Vec2::new((wanted / area) as f32, u.y)).as_dvec2() * rim.x;
                 let p = DVec3::new(disk.x, rim.y, disk.y);
                 let face = (profile.pieces.len() + end) as u32;
                 return CanonicalPoint { p, face, pdf_area };

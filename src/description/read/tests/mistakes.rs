@@ -700,9 +700,8 @@ fn mistakes_in_water_are_told_with_their_place() {
 
 #[test]
 fn a_wrong_profile_is_told_with_its_place() {
-    let turned = |profile: &str| {
-        mistakes(&with_entity(&format!("shape: Revolution(profile: {profile})")))
-    };
+    let turned =
+        |profile: &str| mistakes(&with_entity(&format!("shape: Revolution(profile: {profile})")));
     insta::assert_snapshot!(turned("Bezier(points: [(1, 0)])"), @r#"
     error[scene::profile]: `Bezier` needs 3·n + 1 points (4, 7, 10, …), but there are 1
      --> scene.ron:2:50
