@@ -30,8 +30,8 @@ pub enum Curve {
         /// As many as points, or none: all 1.
         #[serde(default)]
         weights: Vec<f64>,
-        /// `points + 4`, not decreasing; none: evenly spaced, such that the curve begins at the first point and ends at
-        /// the last.
+        /// `points + 4`, not decreasing; none: evenly spaced, such that the curve begins at the first point and
+        /// ends at the last.
         #[serde(default)]
         knots: Vec<f64>,
         /// Whether the points are a ring of evenly spaced knots.
@@ -205,7 +205,8 @@ mod tests {
         assert_eq!(bezier.profile(), spline.profile());
     }
 
-    /// Oracle: each segment of a ring begins where the one before ends, the first after the last, with one tangent.
+    /// Oracle: each segment of a ring begins where the one before ends, the first after the last, with one
+    /// tangent.
     #[test]
     fn a_closed_spline_is_a_smooth_ring() {
         let curve = Curve::Spline {

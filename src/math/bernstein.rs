@@ -1,11 +1,11 @@
 //! Polynomials in Bernstein form on `[0, 1]`: products, derivatives, and all their roots.
 //!
 //! A polynomial of degree `n` is `Σ fₖ·C(n,k)·tᵏ·(1−t)ⁿ⁻ᵏ`, given by its coefficients `fₖ`. Between 0 and 1 it
-//! has at most as many roots as its coefficients change sign, and as many up to an even number (Descartes' rule in
-//! this basis). Halving the interval by de Casteljau's algorithm until one change or none is left isolates every
-//! root. Roots are as little sensitive to the rounding of these coefficients as those of any
-//! basis of non-negative functions (Farouki and Rajan 1987, "On the numerical condition of polynomials in Bernstein
-//! form", *Computer Aided Geometric Design* 4, theorem 2).
+//! has at most as many roots as its coefficients change sign, and as many up to an even number (Descartes' rule
+//! in this basis). Halving the interval by de Casteljau's algorithm until one change or none is left isolates
+//! every root. Roots are as little sensitive to the rounding of these coefficients as those of any basis of
+//! non-negative functions (Farouki and Rajan 1987, "On the numerical condition of polynomials in Bernstein
+//! form", *Computer Aided Geometric Design* 4).
 
 /// Halvings after which what is not isolated is taken for one multiple root: a double root is known to about
 /// `√ε = 2⁻²⁶` and no better.
@@ -42,8 +42,8 @@ pub(super) fn difference(f: &[f64], g: &[f64]) -> Vec<f64> {
     f.iter().zip(g).map(|(a, b)| a - b).collect()
 }
 
-/// The roots in `(0, 1)`, ascending; a multiple root may be told once, more often, or not at all if the sign does not
-/// change there. Coefficients of at most `noise` count as 0, and a polynomial which is 0 has no roots.
+/// The roots in `(0, 1)`, ascending; a multiple root may be told once, more often, or not at all if the sign
+/// does not change there. Coefficients of at most `noise` count as 0, and a polynomial which is 0 has no roots.
 pub(super) fn roots(f: &[f64], noise: f64) -> Vec<f64> {
     let mut coefficients = f.to_vec();
     for value in &mut coefficients {

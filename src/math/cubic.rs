@@ -1,10 +1,11 @@
 //! Rational cubic Bézier curves in the plane, and B-splines as sequences of them.
 //!
-//! A curve is kept in homogeneous form: `P(t) = Σ Bₖ(t)·wₖ·(pₖ, 1)` with the Bernstein polynomials `Bₖ` and the weights
-//! `wₖ > 0`, and its point is `(P.x/P.z, P.y/P.z)`. With weights of 1 it is the plain curve; with others it can be an
-//! exact circle. The *blossom* `b(x, y, z)` is the symmetric function, affine in each of its three arguments,
-//! for which `b(t, t, t) = P(t)`; the control points of the piece from `a` to `b` are its values at
-//! `aaa`, `aab`, `abb`, `bbb` (Ramshaw 1989, "Blossoms are polar forms", *Computer Aided Geometric Design* 6, section 4).
+//! A curve is kept in homogeneous form: `P(t) = Σ Bₖ(t)·wₖ·(pₖ, 1)` with the Bernstein polynomials `Bₖ` and the
+//! weights `wₖ > 0`, and its point is `(P.x/P.z, P.y/P.z)`. With weights of 1 it is the plain curve; with
+//! others it can be an exact circle. The *blossom* `b(x, y, z)` is the symmetric function, affine in each of
+//! its three arguments, for which `b(t, t, t) = P(t)`; the control points of the piece from `a` to `b` are its
+//! values at `aaa`, `aab`, `abb`, `bbb` (Ramshaw 1989, "Blossoms are polar forms", *Computer Aided Geometric
+//! Design* 6, section 4).
 
 use glam::{DVec2, DVec3};
 
@@ -90,7 +91,8 @@ fn de_boor(mut row: [DVec3; 4], knots: [f64; 6], args: [f64; 3]) -> DVec3 {
     row[0]
 }
 
-/// Knots for `count` points such that the curve begins at the first and ends at the last, evenly spaced between.
+/// Knots for `count` points such that the curve begins at the first and ends at the last, evenly spaced
+/// between.
 pub fn clamped_knots(count: usize) -> Vec<f64> {
     let last = count.saturating_sub(3);
     (0..count + 4).map(|k| k.saturating_sub(3).min(last) as f64).collect()

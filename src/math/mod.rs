@@ -5,7 +5,7 @@ mod bounds;
 mod cubic;
 mod frame;
 mod motion;
-pub mod profile;
+pub(crate) mod profile;
 mod ray;
 
 mod rounding;
@@ -14,7 +14,8 @@ pub use bounds::Aabb;
 pub use cubic::{Cubic, clamped_knots, spline};
 pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
-pub use profile::{Jet, Piece, Profile, ProfileError, bracketed_root};
+pub(crate) use profile::bracketed_root;
+pub use profile::{Jet, Piece, Profile, ProfileError};
 pub use ray::Ray;
 
 pub use rounding::{gamma, gamma_f64, offset_ray_origin};

@@ -1,13 +1,14 @@
-//! Cutting a curve where it turns back: into pieces along which radius and height run one way, and which bend one
-//! way by a limited angle.
+//! Cutting a curve where it turns back: into pieces along which radius and height run one way, and which bend
+//! one way by a limited angle.
 
 use super::super::Cubic;
 use super::super::bernstein::{derivative, difference, product, roots};
 use glam::DVec2;
 
-/// Pieces are halved until they bend by at most this, radians. A ray whose angle to the surface is larger meets a
-/// piece at most once, which its two ends decide; for smaller angles rays halve it. Measured on the wine glass of the bench
-/// `speed`: at 0.12, 0.3 and 0.5 rad a ray takes 229, 231 and 244 ns, and the profile 31, 14 and 9 KB.
+/// Pieces are halved until they bend by at most this, radians. A ray whose angle to the surface is larger meets
+/// a piece at most once, which its two ends decide; for smaller angles rays halve it. Measured on the wine
+/// glass of the bench `speed`: at 0.12, 0.3 and 0.5 rad a ray takes 229, 231 and 244 ns, and the profile 31, 14
+/// and 9 KB.
 const MAX_BEND: f64 = 0.3;
 /// Halvings of a piece at most: a bend sharper than a 256th of a piece is a cusp for this purpose.
 const MAX_HALVINGS: u32 = 8;

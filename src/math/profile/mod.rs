@@ -1,16 +1,17 @@
 //! Profiles: plane curves which are turned around the axis `r = 0` into a surface.
 //!
 //! A profile is a chain of rational cubic curves in the half plane (radius, height). It is cut into *pieces*
-//! which are monotone in both coordinates and bend one way, so that the box between the ends of a piece holds it, and all
-//! its directions lie between those at its ends; a tree of boxes is laid over them in the order of the
-//! chain. Neighbouring pieces share the bits of their common end.
+//! which are monotone in both coordinates and bend one way, so that the box between the ends of a piece holds
+//! it, and all its directions lie between those at its ends; a tree of boxes is laid over them in the order of
+//! the chain. Neighbouring pieces share the bits of their common end.
 
 mod cut;
 mod piece;
 mod rings;
 
-pub use piece::{Jet, Piece, bracketed_root};
-pub use rings::{Child, MARGIN, MAX_LEVELS, Rings, WIDTH};
+pub(crate) use piece::bracketed_root;
+pub use piece::{Jet, Piece};
+pub(crate) use rings::{Child, MARGIN, MAX_LEVELS, Rings, WIDTH};
 
 use super::Cubic;
 use glam::DVec2;
@@ -50,7 +51,7 @@ pub struct Profile {
     /// Its parts, in order; those on the axis are left out.
     pub pieces: Vec<Piece>,
     /// The tree over them, its root first.
-    pub rings: Vec<Rings>,
+    pub(crate) rings: Vec<Rings>,
     /// Where it begins and ends; `None` for both if that is one place, and for an end on the axis.
     pub open_ends: [Option<DVec2>; 2],
     /// Greatest radius, least and greatest height.
@@ -59,7 +60,8 @@ pub struct Profile {
     pub sphere: (f64, f64),
     /// For each piece the area of those before it; the last is the whole.
     pub areas: Vec<f64>,
-    /// `π·∫ r² dy` along the profile: what a closed one encloses, positive if it runs with the inside on its left.
+    /// `π·∫ r² dy` along the profile: what a closed one encloses, positive if it runs with the inside on its
+    /// left.
     pub volume: f64,
 }
 
@@ -119,12 +121,12 @@ impl Profile {
         Self { pieces, rings, open_ends, extent: (radius, [low, high]), sphere, areas, volume }
     }
 
-    /// Bound of the error, per axis and in its own unit, of points of the surface and of where rays are found to
-    /// meet it.
+    /// Bound of the error, per axis and in its own unit, of points of the surface and of where rays are found
+    /// to meet it.
     ///
-    /// A point has the rounding of the cubic's coefficients and of its evaluation, a ray seen from the middle of the profile those
-    /// of its distance to the axis and of its height; each of them less than 16 roundings of numbers of the size of the
-    /// whole.
+    /// A point has the rounding of the cubic's coefficients and of its evaluation, a ray seen from the middle
+    /// of the profile those of its distance to the axis and of its height; each of them less than 16 roundings
+    /// of numbers of the size of the whole.
     pub fn error(&self) -> f64 {
         let (radius, [low, high]) = self.extent;
         2.0 * ROUNDINGS * radius.max(low.abs()).max(high.abs())
@@ -177,3 +179,6 @@ fn chained(segments: &[Cubic], tiny: f64) -> Result<Vec<Piece>, ProfileError> {
     }
     Ok(pieces)
 }
+
+#[cfg(test)]
+mod tests;

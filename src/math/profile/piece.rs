@@ -33,6 +33,8 @@ pub struct Piece {
     powers: [DVec2; 4],
     /// … and of the weight; `None` where that is 1.
     weights: Option<[f64; 4]>,
+    /// Rounding of the length of the derivative.
+    still: f64,
 }
 
 /// Point and derivative.
@@ -52,8 +54,13 @@ impl Piece {
         let powers = [a, (b - a) * 3.0, ((a - b) + (c - b)) * 3.0, (d - a) + (b - c) * 3.0];
         let weights = (!polynomial).then(|| powers.map(|p| p.z));
         let powers = powers.map(DVec3::truncate);
-        let mut piece =
-            Self { start, end, directions: cut.directions, v, area: 0.0, powers, weights };
+        // A derivative adds up 7 products of the coefficients, some by 3 and some over the weight, and each
+        // rounds.
+        let least_weight = cut.curve.0.iter().fold(f64::INFINITY, |m, p| m.min(p.z));
+        let greatest = powers.iter().map(|p| p.abs().max_element()).sum::<f64>();
+        let still = 32.0 * f64::EPSILON * greatest / if polynomial { 1.0 } else { least_weight };
+        let directions = cut.directions;
+        let mut piece = Self { start, end, directions, v, area: 0.0, powers, weights, still };
         piece.area = piece.area_up_to(1.0);
         piece
     }
@@ -74,9 +81,9 @@ impl Piece {
     /// The unit direction at `u`, also where the derivative vanishes.
     pub fn direction(&self, u: f64) -> DVec2 {
         let nearest = self.directions[usize::from(u > 0.5)];
-        let direction = self.jet(u).d.normalize_or(nearest);
-        // Rounding at a cusp may turn it out of the range.
-        if direction.dot(nearest) > 0.0 { direction } else { nearest }
+        let derivative = self.jet(u).d;
+        let speed = derivative.length();
+        if speed > self.still { derivative / speed } else { nearest }
     }
 
     /// Where the piece has the radius and height of a point on it, which are known to within rounding.
@@ -123,12 +130,13 @@ impl Piece {
     }
 }
 
-/// The root of `f` (its value, and that over its derivative) between `low` and `high`, where it has the values `ends` of unlike
-/// signs, 0 counting as negative.
+/// The root of `f` (its value, and that over its derivative) between `low` and `high`, where it has the values
+/// `ends` of unlike signs, 0 counting as negative.
 ///
-/// Newton's steps, and halvings where they leave the bracket. Newton's error squares, up to the factor `f''/2f'`. For an `f`
-/// which is monotone in the bracket, with an end like a square root or an extremum at worst, that is about one over twice the distance
-/// to the end. A step shorter than `2⁻³²`, and than `2⁻²⁰` of that distance, therefore leaves less than the rounding of 1.
+/// Newton's steps, and halvings where they leave the bracket. Newton's error squares, up to the factor
+/// `f''/2f'`. For an `f` which is monotone in the bracket, with an end like a square root or an extremum at
+/// worst, that is about one over twice the distance to the end. A step shorter than `2⁻³²`, and than `2⁻²⁰` of
+/// that distance, therefore leaves less than the rounding of 1.
 #[inline]
 pub fn bracketed_root(
     (mut low, mut high): (f64, f64),

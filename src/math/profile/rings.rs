@@ -1,42 +1,43 @@
 //! The tree over the pieces of a profile: rings with a rectangular section, eight to a node.
 //!
-//! Rings are kept in `f32`, in units of the sphere around the profile, with heights from its middle: inside of the sphere
-//! no coordinate of a ray is then larger than 1, nor its length from where it is nearest to the middle. They are
-//! enlarged by [`MARGIN`], which is more than all rounding of a test in `f32` comes to: a height has 3 roundings, a horizontal distance
-//! `c + w·σ` has 5, the sum of squares 3 more, and a radius half of those of its square. With 2⁻²⁴ each these are
-//! less than 2⁻²⁰.
+//! Rings are kept in `f32`, in units of the sphere around the profile, with heights from its middle: inside of
+//! the sphere no coordinate of a ray is then larger than 1, nor its length from where it is nearest to the
+//! middle. They are enlarged by [`MARGIN`], which is more than all rounding of a test in `f32` comes to: a
+//! height has 3 roundings, a horizontal distance `c + w·σ` has 5, the sum of squares 3 more, and a radius half
+//! of those of its square. With 2⁻²⁴ each these are less than 2⁻²⁰.
 
 use super::Piece;
 use glam::DVec2;
 
 /// By how much a ring is larger than what is in it.
-pub const MARGIN: f32 = 1.0 / 524_288.0;
+pub(crate) const MARGIN: f32 = 1.0 / 524_288.0;
 /// Rings of a node.
-pub const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 /// Levels of a tree at most.
-pub const MAX_LEVELS: usize = 6;
+pub(crate) const MAX_LEVELS: usize = 6;
 /// Pieces of a profile at most.
 pub(super) const MAX_PIECES: usize = WIDTH.pow(MAX_LEVELS as u32);
 
 /// A node: some rings and what is in them.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(align(32))]
-pub struct Rings {
+pub(crate) struct Rings {
     /// Least heights.
-    pub low: [f32; WIDTH],
+    pub(crate) low: [f32; WIDTH],
     /// Greatest heights.
-    pub high: [f32; WIDTH],
+    pub(crate) high: [f32; WIDTH],
     /// Squares of the least radii.
-    pub inner: [f32; WIDTH],
+    pub(crate) inner: [f32; WIDTH],
     /// Squares of the greatest radii; −1 where there is no ring.
-    pub outer: [f32; WIDTH],
+    pub(crate) outer: [f32; WIDTH],
     /// What is in them.
-    pub children: [Child; WIDTH],
+    pub(crate) children: [Child; WIDTH],
 }
 
-/// What is in a ring: a node or a piece, and for a ray which passes the ring on which of its ways; by default the first node.
+/// What is in a ring: a node or a piece, and for a ray which passes the ring on which of its ways; by default
+/// the first node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Child(u32);
+pub(crate) struct Child(u32);
 
 impl Child {
     const PIECE: u32 = 1 << 31;
@@ -45,32 +46,32 @@ impl Child {
 
     /// Whether it is a piece of the profile.
     #[inline]
-    pub fn is_piece(self) -> bool {
+    pub(crate) fn is_piece(self) -> bool {
         self.0 & Self::PIECE != 0
     }
 
     /// The index of the piece, or of the node.
     #[inline]
-    pub fn index(self) -> usize {
+    pub(crate) fn index(self) -> usize {
         (self.0 & !(Self::PIECE | Self::WAY_IN | Self::WAY_OUT)) as usize
     }
 
     /// The same, passed on the way to the axis, or from there, or both.
     #[inline]
     #[must_use]
-    pub fn on_ways(self, way_in: bool, way_out: bool) -> Self {
+    pub(crate) fn on_ways(self, way_in: bool, way_out: bool) -> Self {
         Self(self.0 | u32::from(way_in) * Self::WAY_IN | u32::from(way_out) * Self::WAY_OUT)
     }
 
     /// Whether a ray passes it on its way to the axis.
     #[inline]
-    pub fn is_on_way_in(self) -> bool {
+    pub(crate) fn is_on_way_in(self) -> bool {
         self.0 & Self::WAY_IN != 0
     }
 
     /// Whether a ray passes it on its way from the axis.
     #[inline]
-    pub fn is_on_way_out(self) -> bool {
+    pub(crate) fn is_on_way_out(self) -> bool {
         self.0 & Self::WAY_OUT != 0
     }
 }
@@ -85,8 +86,8 @@ impl Rings {
     };
 }
 
-/// The tree over the pieces, its root first, in the order of the chain; the sphere is the height of its middle and its
-/// radius.
+/// The tree over the pieces, its root first, in the order of the chain; the sphere is the height of its middle
+/// and its radius.
 pub(super) fn tree(pieces: &[Piece], sphere: (f64, f64)) -> Vec<Rings> {
     let mut nodes = Vec::new();
     lay(pieces, (0, pieces.len()), sphere, &mut nodes);

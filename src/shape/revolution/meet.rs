@@ -1,14 +1,14 @@
 //! Where a ray first meets a surface of revolution.
 //!
-//! The pieces of the profile whose rings the ray passes are asked in the order in which it comes to them. A piece is crossed
-//! once or not at all, as its ends say, when the ray is steeper or flatter than it everywhere: with all directions of the
-//! piece between `d₀` and `d₁`, and the slope of the ray between `β₀` and `β₁`, the four numbers `α·dᵢ.r − βⱼ·dᵢ.y` are then
-//! of one sign (see [`Side`]). Else it is halved, and the halves which the ray cannot meet are dropped. A crossing is
-//! found by Newton's method in its bracket.
+//! The pieces of the profile whose rings the ray passes are asked in the order in which it comes to them. A
+//! piece is crossed once or not at all, as its ends say, when the ray is steeper or flatter than it everywhere:
+//! with all directions of the piece between `d₀` and `d₁`, and the slope of the ray between `β₀` and `β₁`, the
+//! four numbers `α·dᵢ.r − βⱼ·dᵢ.y` are then of one sign (see [`Side`]). Else it is halved, and the halves which
+//! the ray cannot meet are dropped. A crossing is found by Newton's method in its bracket.
 //!
-//! Neighbouring pieces share the bits of their common end, where the side is computed by the same formula: a ray which
-//! crosses the profile crosses one of its pieces. On the ray itself counts as outside, so that a profile which begins and ends on the
-//! axis is crossed also by the ray along the axis.
+//! Neighbouring pieces share the bits of their common end, where the side is computed by the same formula: a
+//! ray which crosses the profile crosses one of its pieces. On the ray itself counts as outside, so that a
+//! profile which begins and ends on the axis is crossed also by the ray along the axis.
 
 use super::meridian::{End, Meridian, Side, recentred};
 use crate::math::profile::{Child, MARGIN, MAX_LEVELS, WIDTH};
@@ -178,8 +178,8 @@ impl Search<'_> {
         }
     }
 
-    /// Looks for crossings of both halves of a part along which the side may change both ways, by at most `greatest`
-    /// for each length.
+    /// Looks for crossings of both halves of a part along which the side may change both ways, by at most
+    /// `greatest` for each length.
     #[inline(never)]
     fn halves<S: Side>(
         &mut self,
@@ -211,8 +211,8 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a crossing between two lengths can be of interest. Of a radius near the closest approach the length is
-    /// known to the root of rounding, which is less than the margin of a ring.
+    /// Whether a crossing between two lengths can be of interest. Of a radius near the closest approach the
+    /// length is known to the root of rounding, which is less than the margin of a ring.
     #[inline]
     fn holds(&self, a: f64, b: f64) -> bool {
         let slack = self.profile.sphere.1 * f64::from(MARGIN);

@@ -1,15 +1,16 @@
 //! A ray in the half plane (radius, height), where a surface of revolution is its profile.
 //!
 //! With `σ` the length along the ray, its height is `y = o + δ·σ`, and horizontally it passes the axis at the
-//! distance `b`, from where it is `q = c + w·σ` away along its direction: its radius is `ρ = √(b² + q²)` (Kajiya 1983, "New
-//! Techniques for Ray Tracing Procedurally Defined Objects", section 4; van Wijk 1984, "Ray Tracing Objects Defined by Sweeping
-//! a Sphere", for the reduction to the plane). This is one branch of a hyperbola, which the profile crosses where the ray
-//! meets the surface. Which side of it a point is on is told in one of two ways, each free of cancellation where it is
-//! used and continuous in the slope `δ/w`, 0 included:
+//! distance `b`, from where it is `q = c + w·σ` away along its direction: its radius is `ρ = √(b² + q²)`
+//! (the reduction to the plane is that of Kajiya 1983, "New Techniques for Ray Tracing Procedurally Defined
+//! Objects", ACM Trans. Graph. 2(3), on surfaces of revolution; and of van Wijk 1984, "Ray Tracing Objects
+//! Defined by Sweeping Planar Cubic Splines", ACM Trans. Graph. 3(3)). This is one branch of a hyperbola, which
+//! the profile crosses where the ray meets the surface. Which side of it a point is on is told in one of two
+//! ways, each free of cancellation where it is used and continuous in the slope `δ/w`, 0 included:
 //!
 //! * [`Steep`], `|δ| ≥ w`: by the radius, `r − ρ(y)`, with `q = c + (w/δ)·(y − o)`;
-//! * [`Shallow`], `|δ| < w`: by the height, `o + (δ/w)·(±√(r² − b²) − c) − y`, once for either sign, the way to the axis and the
-//!   way from there, which for level rays are one line.
+//! * [`Shallow`], `|δ| < w`: by the height, `o + (δ/w)·(±√(r² − b²) − c) − y`, once for either sign, the way to
+//!   the axis and the way from there, which for level rays are one line.
 //!
 //! Multiplied out, both give Kajiya's polynomial of degree 6, in which the two ways of a nearly level ray are a
 //! double root.
@@ -75,7 +76,8 @@ impl Meridian {
             && passed + nearest <= most.x * most.x
     }
 
-    /// The ray as the tree of a profile sees it, whose middle has this height; with the inverse of the unit of the tree.
+    /// The ray as the tree of a profile sees it, whose middle has this height; with the inverse of the unit of
+    /// the tree.
     pub(super) fn narrow(&self, middle: f64, inverse_unit: f64) -> Narrow {
         let unit = |x: f64| (x * inverse_unit) as f32;
         let b = unit(self.b);
@@ -137,7 +139,8 @@ pub(super) struct Passages {
 }
 
 impl Narrow {
-    /// The parts of `from..to` inside of the rings of a node: all in step, so that the compiler makes vectors of them.
+    /// The parts of `from..to` inside of the rings of a node: all in step, so that the compiler makes vectors
+    /// of them.
     #[inline]
     pub(super) fn passages(&self, rings: &Rings, from: f32, to: f32) -> Passages {
         let (mut enter, mut leave) = ([0.0; WIDTH], [0.0; WIDTH]);
@@ -196,7 +199,8 @@ pub(super) trait Side {
     fn along(&self, jet: &Jet) -> (f64, f64);
     /// Length along the ray where it is at a point of its own.
     fn sigma(&self, p: DVec2) -> f64;
-    /// Length along the ray where it has the coordinate of a point which tells its ways apart: the height, or the radius.
+    /// Length along the ray where it has the coordinate of a point which tells its ways apart: the height, or
+    /// the radius.
     fn level(&self, p: DVec2) -> f64;
 }
 
@@ -348,8 +352,8 @@ fn larger<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
-/// The ray, seen from where it is nearest to a point of the axis, with a unit direction; the length of its direction, and how
-/// far its origin was moved, in units of length.
+/// The ray, seen from where it is nearest to a point of the axis, with a unit direction; the length of its
+/// direction, and how far its origin was moved, in units of length.
 ///
 /// Coordinates are then of the size of the shape instead of its distance.
 pub(super) fn recentred(ray: &LocalRay, height: f64) -> (LocalRay, f64, f64) {

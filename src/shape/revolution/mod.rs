@@ -1,8 +1,8 @@
 //! A profile turned around the y axis. Faces: the pieces of the profile in their order, then the disk that
 //! closes its beginning, then the one that closes its end.
 //!
-//! A closed surface, one which bounds a solid, faces outwards; an open one faces to the right of the way along its
-//! profile, radii growing to the right and heights upwards.
+//! A closed surface, one which bounds a solid, faces outwards; an open one faces to the right of the way along
+//! its profile, radii growing to the right and heights upwards.
 
 mod meet;
 mod meridian;
@@ -131,7 +131,8 @@ impl Revolution {
 
     /// The area under a map: Gauss's rule along each piece, even steps around the axis.
     pub(super) fn world_area(&self, world_from_shape: &DAffine3) -> f64 {
-        /// For a map which stretches by a factor `s` across the axis the error falls as `((s − 1)/(s + 1))^AROUND`.
+        /// For a map which stretches by a factor `s` across the axis the error falls as `((s − 1)/(s +
+        /// 1))^AROUND`.
         const AROUND: u32 = 64;
         let factor = AreaFactor::new(&world_from_shape.matrix3);
         let around = |along: DVec2| {
