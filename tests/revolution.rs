@@ -266,8 +266,8 @@ impl Dense {
         for segment in 0..self.curves.len() {
             let points = &self.points[segment * (STEPS + 1)..][..=STEPS];
             let mut before = side(points[0].0, points[0].1);
-            for k in 1..=STEPS {
-                let here = side(points[k].0, points[k].1);
+            for (k, &(r, y)) in points.iter().enumerate().skip(1) {
+                let here = side(r, y);
                 if (before > 0.0) != (here > 0.0) && !before.is_nan() && !here.is_nan() {
                     let (a, b) = ((k - 1) as f64 / STEPS as f64, k as f64 / STEPS as f64);
                     let p =
@@ -667,8 +667,9 @@ fn the_wine_fills_its_glass() {
     }
 }
 
-/// Oracle: a mesh of the vase of 1000 chords around and 400 along. Hits and misses are the same but for rays
-/// which pass within its error, and so are distances.
+/// Oracle: a mesh of the vase of 1000 chords around and 400 along, at most `e` off. Hits and misses are the same but for
+/// rays that graze it within `e`, a share of about √(2e/r), 0.3 %; and so are places, but where rays meet it at so flat an
+/// angle that it bends by more than `e` over the way between both.
 #[test]
 fn a_fine_mesh_is_met_at_the_same_places() {
     let shape = primitive(&bezier(&VASE), false);
@@ -704,10 +705,15 @@ fn a_fine_mesh_is_met_at_the_same_places() {
             continue;
         };
         let cos = shape.surface(ray.at(a.t), a.face, false).ng.normalize().dot(ray.d).abs();
-        differ += u32::from((a.t - b.t).abs() * cos > 2.0 * error);
+        // Half the square of the way over the least radius, 0.3: at this angle that is e/5.
+        if cos > 0.03 {
+            let apart = (a.t - b.t).abs() * cos;
+            assert!(apart < 1.5 * error, "{ray:?}: {apart:e} apart, {cos}");
+        } else {
+            differ += u32::from((a.t - b.t).abs() > 0.05);
+        }
     }
-    // A share of about √(error/r) of the hits graze it.
-    assert!(differ < 20, "{differ}");
+    assert!(differ < 20_000 * 3 / 1000, "{differ}");
 }
 
 /// A profile with nothing to turn, or across the axis, is an error which says where; ugly ones are defined.

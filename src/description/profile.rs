@@ -166,7 +166,7 @@ fn check_knots(knots: &[f64], points: usize) -> Result<(), CurveError> {
     if found != points + 4 {
         return Err(CurveError::Length { list: "knots", expected: points + 4, points, found });
     }
-    if let Some(index) = (1..found).find(|&k| !(knots[k] >= knots[k - 1])) {
+    if let Some(index) = (1..found).find(|&k| knots[k] < knots[k - 1]) {
         return Err(CurveError::Knot { index, what: "is less than the one before it" });
     }
     let equal = |index: &usize| knots[*index] == knots[*index + 3];

@@ -75,7 +75,9 @@ pub(super) fn read_profile(cursor: &Cursor, report: &mut Report) -> Option<Arc<P
 fn tell(error: &CurveError, curve: &Curve, cursor: &Cursor, report: &mut Report) {
     let list = cursor.at("points");
     let (place, message, help) = match error {
-        CurveError::Points { .. } => (list, error.to_string(), None),
+        CurveError::Points { .. } | CurveError::Profile(ProfileError::TooLong { .. }) => {
+            (list, error.to_string(), None)
+        }
         CurveError::Length { list: name, expected: 0, .. } => {
             let message = "a closed spline has evenly spaced knots of its own".to_owned();
             (cursor.at(name), message, Some("leave out `knots`, or `closed`"))
@@ -95,7 +97,6 @@ fn tell(error: &CurveError, curve: &Curve, cursor: &Cursor, report: &mut Report)
             let message = "this point or one after it is out of range".to_owned();
             (list.nth(first_point(curve, *segment)), message, None)
         }
-        CurveError::Profile(ProfileError::TooLong { .. }) => (list, error.to_string(), None),
         CurveError::Profile(ProfileError::Empty) => {
             let message = "no surface comes of this profile".to_owned();
             let help = "it needs points at different places, not all of them on the axis";

@@ -60,7 +60,9 @@ impl Child {
     #[inline]
     #[must_use]
     pub(crate) fn on_ways(self, way_in: bool, way_out: bool) -> Self {
-        Self(self.0 | u32::from(way_in) * Self::WAY_IN | u32::from(way_out) * Self::WAY_OUT)
+        let way_in = if way_in { Self::WAY_IN } else { 0 };
+        let way_out = if way_out { Self::WAY_OUT } else { 0 };
+        Self(self.0 | way_in | way_out)
     }
 
     /// Whether a ray passes it on its way to the axis.

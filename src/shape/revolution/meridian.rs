@@ -142,6 +142,10 @@ impl Narrow {
     /// The parts of `from..to` inside of the rings of a node: all in step, so that the compiler makes vectors
     /// of them.
     #[inline]
+    #[expect(
+        clippy::needless_bitwise_bool,
+        reason = "a branch for each ring would undo the vectors"
+    )]
     pub(super) fn passages(&self, rings: &Rings, from: f32, to: f32) -> Passages {
         let (mut enter, mut leave) = ([0.0; WIDTH], [0.0; WIDTH]);
         for k in 0..WIDTH {
