@@ -668,7 +668,7 @@ fn the_wine_fills_its_glass() {
 }
 
 /// Oracle: a mesh of the vase of 1000 chords around and 400 along, at most `e` off. Hits and misses are the same but for
-/// rays that graze it within `e`, a share of about √(2e/r), 0.3 %; and so are places, but where rays meet it at so flat an
+/// rays that graze it within `e`, a share of about √(2e/r), 0.6 %; and so are places, but where rays meet it at so flat an
 /// angle that it bends by more than `e` over the way between both.
 #[test]
 fn a_fine_mesh_is_met_at_the_same_places() {
@@ -691,8 +691,8 @@ fn a_fine_mesh_is_met_at_the_same_places() {
         }
     }
     let tree = MeshTree::build(Arc::new(mesh), BvhQuality::Fast);
-    // r·(1 − cos(π/1000)) around the axis, less along it.
-    let error = 0.8 * (1.0 - (PI / 1000.0).cos());
+    // r·(1 − cos(π/n)) around the axis, and along it |P''|/8n² with |P''| ≤ 6·|P₀ − 2P₁ + P₂| = 10.4.
+    let error = 0.8 * (1.0 - (PI / f64::from(around)).cos()) + 1.3 / f64::from(along).powi(2);
     let mut differ = 0;
     for k in 0..20_000 {
         let n = &mut Numbers::new(10, k);
@@ -705,15 +705,15 @@ fn a_fine_mesh_is_met_at_the_same_places() {
             continue;
         };
         let cos = shape.surface(ray.at(a.t), a.face, false).ng.normalize().dot(ray.d).abs();
-        // Half the square of the way over the least radius, 0.3: at this angle that is e/5.
+        // Half the square of the way, e/0.03, over the least radius, 0.3: e/40.
         if cos > 0.03 {
             let apart = (a.t - b.t).abs() * cos;
-            assert!(apart < 1.5 * error, "{ray:?}: {apart:e} apart, {cos}");
+            assert!(apart < 1.1 * error, "{ray:?}: {apart:e} apart, {cos}");
         } else {
             differ += u32::from((a.t - b.t).abs() > 0.05);
         }
     }
-    assert!(differ < 20_000 * 3 / 1000, "{differ}");
+    assert!(differ < 20_000 * 6 / 1000, "{differ}");
 }
 
 /// A profile with nothing to turn, or across the axis, is an error which says where; ugly ones are defined.
