@@ -2,8 +2,8 @@
 //!
 //! The pieces of the profile whose rings the ray passes are asked in the order in which it comes to them. A
 //! piece is crossed once or not at all, as its ends say, when the ray is steeper or flatter than it everywhere:
-//! with all directions of the piece between `d₀` and `d₁`, and the slope of the ray between `β₀` and `β₁`, the
-//! four numbers `α·dᵢ.r − βⱼ·dᵢ.y` are then of one sign (see [`Side`]). Else it is halved, and the halves which
+//! with the directions at both ends, between which are all others, and the slopes of the ray at both ends the
+//! four changes of the side are then of one sign (see [`Side::tilt`]). Else it is halved, and the halves which
 //! the ray cannot meet are dropped. A crossing is found by Newton's method in its bracket.
 //!
 //! Neighbouring pieces share the bits of their common end, where the side is computed by the same formula: a
@@ -156,11 +156,13 @@ impl Search<'_> {
     /// Looks for crossings of a part of a piece.
     #[inline]
     fn part<S: Side>(&mut self, side: &S, index: u32, piece: &Piece, a: End, b: End) {
-        let change = Change::between(side.alpha(), &a, &b);
-        if change.one_way {
+        let [aa, ab, ba, bb] = changes(&a, &b);
+        let rises = aa > 0.0 && ab > 0.0 && ba > 0.0 && bb > 0.0;
+        let falls = aa < 0.0 && ab < 0.0 && ba < 0.0 && bb < 0.0;
+        if rises || falls {
             self.crossing(side, index, piece, &a, &b);
         } else {
-            self.halves(side, index, piece, a, b, change.greatest);
+            self.halves(side, index, piece, a, b);
         }
     }
 
@@ -178,18 +180,9 @@ impl Search<'_> {
         }
     }
 
-    /// Looks for crossings of both halves of a part along which the side may change both ways, by at most
-    /// `greatest` for each length.
+    /// Looks for crossings of both halves of a part along which the side may change both ways.
     #[inline(never)]
-    fn halves<S: Side>(
-        &mut self,
-        side: &S,
-        index: u32,
-        piece: &Piece,
-        a: End,
-        b: End,
-        greatest: f64,
-    ) {
+    fn halves<S: Side>(&mut self, side: &S, index: u32, piece: &Piece, a: End, b: End) {
         let middle = f64::midpoint(a.u, b.u);
         if self.halvings == 0 || middle <= a.u || middle >= b.u {
             self.crossing(side, index, piece, &a, &b);
@@ -199,7 +192,7 @@ impl Search<'_> {
         // along the sides of its box.
         let way = (b.p - a.p).abs().element_sum();
         let unlike = (a.value > 0.0) != (b.value > 0.0);
-        if !unlike && (a.value + b.value).abs() > side.rate(greatest, &a, &b) * way {
+        if !unlike && (a.value + b.value).abs() > greatest_rate(&a, &b) * way {
             return;
         }
         self.halvings -= 1;
@@ -228,8 +221,8 @@ impl Search<'_> {
             let [to_axis, from_axis] = [-1.0, 1.0].map(|sign| self.ray.shallow(sign));
             let passes = (to_axis.value(rim) > 0.0) != (from_axis.value(rim) > 0.0);
             // Between the two points over the rim, also where the height hardly tells where.
-            let over = (to_axis.sigma(rim), from_axis.sigma(rim));
-            (passes && rim.x >= self.ray.b).then(|| level.sigma(rim).clamp(over.0, over.1))
+            let over = (to_axis.level(rim), from_axis.level(rim));
+            (passes && rim.x >= self.ray.b).then(|| level.sigma(rim).max(over.0).min(over.1))
         };
         if let Some(sigma) = sigma
             && sigma > self.from
@@ -241,30 +234,23 @@ impl Search<'_> {
 }
 
 fn end_of<S: Side>(side: &S, u: f64, p: DVec2, direction: DVec2) -> End {
-    End { u, p, direction, value: side.value(p), beta: side.beta(p) }
+    End { u, p, direction, value: side.value(p), tilt: side.tilt(p) }
 }
 
-/// How the value of a side changes between two ends: `α·r' − β·y'` for all directions and slopes there.
-struct Change {
-    /// Whether it is of one sign.
-    one_way: bool,
-    /// Its greatest size.
-    greatest: f64,
+/// The changes of the side for the directions at both ends and the tilts at both ends. Between the ends they are
+/// between these, up to a positive factor: linear in the direction and in the quotient of the tilt.
+#[inline]
+fn changes(a: &End, b: &End) -> [f64; 4] {
+    [
+        a.tilt.change(a.direction),
+        a.tilt.change(b.direction),
+        b.tilt.change(a.direction),
+        b.tilt.change(b.direction),
+    ]
 }
 
-impl Change {
-    #[inline]
-    fn between(alpha: f64, a: &End, b: &End) -> Self {
-        let change = |direction: DVec2, beta: f64| alpha * direction.x - beta * direction.y;
-        // Linear in the direction and in the slope: its extremes are in the corners.
-        let corners = [
-            change(a.direction, a.beta),
-            change(a.direction, b.beta),
-            change(b.direction, a.beta),
-            change(b.direction, b.beta),
-        ];
-        let least = corners.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = corners.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self { one_way: least > 0.0 || most < 0.0, greatest: most.max(-least) }
-    }
+/// Bound between two ends of the change of the value by the length of the way.
+fn greatest_rate(a: &End, b: &End) -> f64 {
+    let [aa, ab, ba, bb] = changes(a, b).map(f64::abs);
+    (aa.max(ab) / a.tilt.scale).max(ba.max(bb) / b.tilt.scale)
 }

@@ -183,8 +183,25 @@ pub(super) struct End {
     pub(super) direction: DVec2,
     /// [`Side::value`].
     pub(super) value: f64,
-    /// [`Side::beta`].
-    pub(super) beta: f64,
+    /// [`Side::tilt`].
+    pub(super) tilt: Tilt,
+}
+
+/// How the side changes at a point: along a direction `(r', y')` by `(a·r' − b·y')/scale`.
+#[derive(Clone, Copy)]
+pub(super) struct Tilt {
+    pub(super) a: f64,
+    pub(super) b: f64,
+    /// Not negative; 0 where the change is infinite.
+    pub(super) scale: f64,
+}
+
+impl Tilt {
+    /// `a·r' − b·y'`.
+    #[inline]
+    pub(super) fn change(&self, direction: DVec2) -> f64 {
+        self.a * direction.x - self.b * direction.y
+    }
 }
 
 /// On which side of a ray points of the half plane are.
@@ -193,12 +210,8 @@ pub(super) trait Side {
     fn least_radius(&self) -> f64;
     /// Positive on one side, negative on the other.
     fn value(&self, p: DVec2) -> f64;
-    /// The value changes along a direction `(r', y')` by a positive multiple of `α·r' − β·y'`. This is `α` …
-    fn alpha(&self) -> f64;
-    /// … and this `β`, which changes one way along both coordinates.
-    fn beta(&self, p: DVec2) -> f64;
-    /// Bound between two ends of the change of the value by the length of the way, from one of `α·r' − β·y'`.
-    fn rate(&self, change: f64, a: &End, b: &End) -> f64;
+    /// How it changes there; the quotient `b/a` changes one way along both coordinates.
+    fn tilt(&self, p: DVec2) -> Tilt;
     /// The value along a curve, and that over its derivative.
     fn along(&self, jet: &Jet) -> (f64, f64);
     /// Length along the ray where it is at a point of its own.
@@ -237,20 +250,16 @@ impl Side for Steep {
         p.x - (self.b2 + q * q).sqrt()
     }
 
-    fn alpha(&self) -> f64 {
-        1.0
-    }
-
-    /// `dρ/dy = k·q/ρ`.
+    /// `r' − (k·q/ρ)·y'`.
     #[inline]
-    fn beta(&self, p: DVec2) -> f64 {
+    fn tilt(&self, p: DVec2) -> Tilt {
         let q = self.q(p.y);
         let rho = (self.b2 + q * q).sqrt();
-        if rho > 0.0 { self.k * (q / rho) } else { 0.0 }
-    }
-
-    fn rate(&self, change: f64, _: &End, _: &End) -> f64 {
-        change
+        if rho > 0.0 {
+            Tilt { a: rho, b: self.k * q, scale: rho }
+        } else {
+            Tilt { a: 1.0, b: 0.0, scale: 1.0 }
+        }
     }
 
     #[inline]
@@ -305,19 +314,15 @@ impl Side for Shallow {
         self.axis + self.kappa * self.distance(p.x) - p.y
     }
 
-    fn alpha(&self) -> f64 {
-        self.kappa
-    }
-
-    /// `dr/d|q| = |q|/r`.
+    /// `κ·(r/|q|)·r' − y'`: infinite at the closest approach.
     #[inline]
-    fn beta(&self, p: DVec2) -> f64 {
-        if p.x > self.b { self.distance(p.x) / p.x } else { 0.0 }
-    }
-
-    /// `κ·r/|q|·r' − y'`: infinite at the closest approach.
-    fn rate(&self, change: f64, a: &End, b: &End) -> f64 {
-        change / a.beta.min(b.beta)
+    fn tilt(&self, p: DVec2) -> Tilt {
+        let distance = self.distance(p.x);
+        if distance > 0.0 {
+            Tilt { a: self.kappa * p.x, b: distance, scale: distance }
+        } else {
+            Tilt { a: self.kappa, b: 0.0, scale: 0.0 }
+        }
     }
 
     #[inline]
