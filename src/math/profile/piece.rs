@@ -160,16 +160,18 @@ pub fn bracketed_root(
             high = u;
         }
         let newton = u - step;
-        // Where Newton crawls along one end, every third step halves.
-        let crawls = count % 3 == 2 && high - low > 0.5 * width;
-        if count % 3 == 2 {
+        let stays = newton >= low && newton <= high;
+        let room = (u - ends.0).min(ends.1 - u);
+        if stays && step.abs() < LAST_STEP.min(SHARE * room) {
+            return newton;
+        }
+        // Where Newton crawls along one end, every fourth step halves.
+        let fourth = count % 4 == 3;
+        let crawls = fourth && high - low > 0.5 * width;
+        if fourth {
             width = high - low;
         }
-        if newton >= low && newton <= high && !crawls {
-            let room = (u - ends.0).min(ends.1 - u);
-            if step.abs() < LAST_STEP.min(SHARE * room) {
-                return newton;
-            }
+        if stays && !crawls {
             u = newton;
         } else {
             let middle = f64::midpoint(low, high);
