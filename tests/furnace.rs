@@ -25,7 +25,7 @@ fn cavity(albedo: f64, emission: f64, settings: &str, inside: &str) -> String {
     )
 }
 
-const SHAPES: [(&str, &str); 11] = [
+const SHAPES: [(&str, &str); 13] = [
     ("sphere", "Sphere(radius: 0.5)"),
     ("rectangle", "Rectangle(size: (1, 0.7))"),
     ("disk", "Disk(radius: 0.6)"),
@@ -34,6 +34,14 @@ const SHAPES: [(&str, &str); 11] = [
     ("open cylinder", "Cylinder(radius: 0.4, height: 0.7, capped: false)"),
     ("cone", "Cone(radius: 0.5, height: 0.8)"),
     ("open cone", "Cone(radius: 0.5, height: 0.8, capped: false)"),
+    (
+        "turned solid",
+        "Revolution(profile: Lines(points: [(0.2, -0.4), (0.5, -0.1), (0.1, 0.1), (0.3, 0.4)]), capped: true)",
+    ),
+    (
+        "turned sheet",
+        "Revolution(profile: Bezier(points: [(0.1, -0.3), (0.7, -0.3), (0.1, 0.1), (0.5, 0.4)]))",
+    ),
     ("mesh", "Mesh(\"ball\")"),
     ("plane", "Plane()"),
     ("nothing", ""),
@@ -264,6 +272,8 @@ fn no_shape_can_be_seen_in_an_even_sky() {
         "Box(size: (1.2, 0.8, 1))",
         "Cylinder(radius: 0.7, height: 1)",
         "Cone()",
+        "Revolution(profile: Bezier(points: [(0, -0.8), (1.2, -0.8), (0.4, 0.4), (0, 0.9)]))",
+        "Revolution(profile: Spline(points: [(0.9, 0), (0.6, 0.4), (0.3, 0), (0.6, -0.4)], closed: true))",
         "Mesh(\"flat\")",
         "Disk()",
         "Rectangle()",

@@ -7,10 +7,10 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 use kinora::build::bvh::{Hit, MeshTree, SceneGeometry, TopLevel};
 use kinora::description::{BvhQuality, TriangleMesh};
 use kinora::extract::{Geometry, Instance, NOTHING};
-use kinora::math::{Aabb, MotionTransform, Ray, offset_ray_origin};
+use kinora::math::{Aabb, Cubic, MotionTransform, Profile, Ray, offset_ray_origin};
 use kinora::sampling::Sampler;
 use kinora::shade::TextureNeeds;
-use kinora::shape::{LocalRay, Primitive};
+use kinora::shape::{LocalRay, Primitive, Revolution};
 use std::sync::Arc;
 
 /// A stream of uniforms.
@@ -82,17 +82,32 @@ fn instance(geometry: Geometry, local: Aabb, keys: &[DAffine3]) -> Instance {
     }
 }
 
-const PRIMITIVES: [Primitive; 9] = [
-    Primitive::Sphere,
-    Primitive::Rectangle,
-    Primitive::Disk,
-    Primitive::Cuboid,
-    Primitive::Cylinder { capped: true },
-    Primitive::Cylinder { capped: false },
-    Primitive::Cone { capped: true },
-    Primitive::Cone { capped: false },
-    Primitive::Plane,
-];
+fn turned(points: &[[f64; 2]]) -> Primitive {
+    let lines: Vec<Cubic> =
+        points.windows(2).map(|p| Cubic::line(p[0].into(), p[1].into())).collect();
+    let profile = Profile::new(&lines).expect("off its axis");
+    Primitive::Revolution(Revolution::new(Arc::new(profile), true))
+}
+
+/// The last is the only one without bounds.
+fn primitives() -> Vec<Primitive> {
+    let curve =
+        Cubic::new([[0.5, 0.0], [1.2, 0.3], [0.2, 0.9], [0.8, 1.2]].map(DVec2::from), [1.0; 4]);
+    let vase = Profile::new(&[curve]).expect("off its axis");
+    vec![
+        Primitive::Sphere,
+        Primitive::Rectangle,
+        Primitive::Disk,
+        Primitive::Cuboid,
+        Primitive::Cylinder { capped: true },
+        Primitive::Cylinder { capped: false },
+        Primitive::Cone { capped: true },
+        Primitive::Cone { capped: false },
+        Primitive::Revolution(Revolution::new(Arc::new(vase), false)),
+        turned(&[[0.4, -0.5], [0.8, 0.1], [0.3, 0.5]]),
+        Primitive::Plane,
+    ]
+}
 
 fn ray(u: &mut Uniforms, time: bool) -> Ray {
     let o = u.point() * 4.0 - 0.5;
@@ -111,6 +126,7 @@ fn the_tree_of_instances_equals_brute_force() {
     let singles: Vec<Arc<MeshTree>> =
         ball.triangles.iter().map(|t| mesh_of(ball.positions.clone(), vec![*t])).collect();
     let mut u = Uniforms::new(1, 0);
+    let primitives = primitives();
     for moving in [false, true] {
         let instances: Vec<Instance> = (0..60)
             .map(|k| {
@@ -123,8 +139,9 @@ fn the_tree_of_instances_equals_brute_force() {
                     instance(Geometry::Mesh(0), local, &keys)
                 } else {
                     // one plane is enough
-                    let primitive = PRIMITIVES[if k == 1 { 8 } else { k % 8 }];
-                    instance(Geometry::Primitive(primitive), primitive.bounds(), &keys)
+                    let primitive = primitives[if k == 1 { 10 } else { k % 10 }].clone();
+                    let bounds = primitive.bounds();
+                    instance(Geometry::Primitive(primitive), bounds, &keys)
                 }
             })
             .collect();
@@ -147,7 +164,7 @@ fn the_tree_of_instances_equals_brute_force() {
                     o: inverse.transform_point3(ray.o.as_dvec3()),
                     d: inverse.transform_vector3(ray.d.as_dvec3()),
                 };
-                match object.geometry {
+                match &object.geometry {
                     Geometry::Primitive(primitive) => {
                         if let Some(hit) = primitive.intersect(&local, f64::INFINITY) {
                             offer(hit.t, index, hit.face);
@@ -364,6 +381,19 @@ fn a_stack_of_fifty_squares_is_crossed_fifty_times() {
     }
 }
 
+/// An exact ball from rational curves.
+fn turned_ball() -> Primitive {
+    let (w, h) = ((1.0 + 2.0_f64.sqrt()) / 3.0, 2.0 - 2.0_f64.sqrt());
+    let quarter = |s: f64| {
+        let points = [[0.0, s], [h, s], [1.0, s * h], [1.0, 0.0]].map(DVec2::from);
+        Cubic::new(points, [1.0, w, w, 1.0])
+    };
+    let [lower, upper] = [-1.0, 1.0].map(quarter);
+    let upper = Cubic([upper.0[3], upper.0[2], upper.0[1], upper.0[0]]);
+    let profile = Profile::new(&[lower, upper]).expect("off its axis");
+    Primitive::Revolution(Revolution::new(Arc::new(profile), false))
+}
+
 /// Oracle: a ray sent on from a convex surface to the outside meets nothing, one sent inside meets the
 /// far side. Every shape, scales from 10⁻⁶ to 10⁶ and places up to 10⁶ times as far; a triangle never
 /// meets itself.
@@ -374,6 +404,8 @@ fn rays_do_not_meet_the_surface_which_they_leave() {
         Geometry::Primitive(Primitive::Cuboid),
         Geometry::Primitive(Primitive::Cylinder { capped: true }),
         Geometry::Primitive(Primitive::Cone { capped: true }),
+        Geometry::Primitive(turned(&[[0.3, -0.5], [0.8, -0.2], [0.9, 0.1], [0.0, 0.5]])),
+        Geometry::Primitive(turned_ball()),
         Geometry::Mesh(0),
     ];
     let ball = icosphere(1, false);
@@ -381,17 +413,17 @@ fn rays_do_not_meet_the_surface_which_they_leave() {
     let (mut outward, mut inward) = (0, 0);
     for k in 0..200_000 {
         let mut u = Uniforms::new(7, k);
-        let geometry = closed[k as usize % closed.len()];
+        let geometry = closed[k as usize % closed.len()].clone();
         let scale = 10_f64.powf(12.0 * u.next() - 6.0);
         // f32 rays resolve a shape as long as its distance is below some 10⁵ sizes
         let away = u.direction() * scale * 10_f64.powf(4.0 * u.next()) * u.next().round();
         let shape = u.affine().matrix3;
         let key = DAffine3 { matrix3: shape * scale, translation: away };
-        let local = match geometry {
+        let local = match &geometry {
             Geometry::Primitive(primitive) => primitive.bounds(),
             Geometry::Mesh(_) => Aabb::from_points(ball.positions.iter().copied()),
         };
-        let instances = [instance(geometry, local, &[key])];
+        let instances = [instance(geometry.clone(), local, &[key])];
         let mut instances = instances;
         instances[0].bounds = local.transformed(&key).inflated((away.length() * 1e-6) as f32);
         let top = TopLevel::build(&instances);
@@ -419,7 +451,10 @@ fn rays_do_not_meet_the_surface_which_they_leave() {
             );
         } else if let Some(again) = again {
             inward += 1;
-            let flat = !matches!(geometry, Geometry::Primitive(Primitive::Sphere));
+            let flat = !matches!(
+                geometry,
+                Geometry::Primitive(Primitive::Sphere | Primitive::Revolution(_))
+            );
             let curved = again.primitive == 0
                 && !matches!(geometry, Geometry::Mesh(_) | Geometry::Primitive(Primitive::Cuboid));
             assert!(

@@ -160,9 +160,12 @@ fn element(at: impl Fn(f64, f64) -> DVec3) -> impl Fn(f64, f64) -> (DVec3, DVec3
     }
 }
 
+/// An exact ball of radius 1 from rational curves.
+const BALL: &str = "Revolution(profile: Bezier(points: [(0, -1), (0.5857864376269049, -1), (1, -0.5857864376269049), (1, 0), (1, 0.5857864376269049), (0.5857864376269049, 1), (0, 1)], weights: [1, 0.8047378541243649, 0.8047378541243649, 1, 0.8047378541243649, 0.8047378541243649, 1]))";
+
 /// Oracle: a midpoint rule of 1000² points over the visible (convex) surface, in `f64`. The shapes
-/// without a rule of their own for drawing are drawn by area: boxes, cylinders, cones, and spheres
-/// that are stretched.
+/// without a rule of their own for drawing are drawn by area: boxes, cylinders, cones, surfaces of
+/// revolution, and spheres that are stretched.
 #[test]
 fn all_other_shapes_light_a_floor_as_a_quadrature_says() {
     let turn = DQuat::from_rotation_x(40_f64.to_radians());
@@ -219,6 +222,17 @@ fn all_other_shapes_light_a_floor_as_a_quadrature_says() {
         ("Cylinder(radius: 0.6, height: 0.9, capped: true)", "(1, 1, 1)", side + lower + upper),
         ("Cone(radius: 0.6, height: 0.9)", "(1, 1, 1)", slope + lower),
         ("Sphere()", "(0.5, 0.3, 0.8)", ellipsoid),
+        (
+            "Revolution(profile: Lines(points: [(1, -0.5), (1, 0.5)]), capped: true)",
+            "(0.6, 0.9, 0.6)",
+            side + lower + upper,
+        ),
+        (
+            "Revolution(profile: Lines(points: [(0, 0.45), (0.6, -0.45), (0, -0.45)]))",
+            "(1, 1, 1)",
+            slope + lower,
+        ),
+        (BALL, "(0.5, 0.3, 0.8)", ellipsoid),
         ("Box(size: (0.8, 0.6, 1))", "(1, 1, 1)", faces),
         ("Box()", "(0.8, 0.6, 1)", faces),
     ];
@@ -339,6 +353,11 @@ fn a_lamp_of_given_power_has_the_radiance_of_its_area() {
         ("Box(size: (1, 2, 3))", false, 22.0 * PI),
         ("Cylinder(radius: 0.5, height: 2)", false, 2.5 * PI * PI),
         ("Cone(radius: 3, height: 4)", false, 24.0 * PI * PI),
+        (
+            "Revolution(profile: Lines(points: [(3, -2), (0, 2)]), capped: true)",
+            false,
+            24.0 * PI * PI,
+        ),
     ];
     for (shape, two_sided, area_pi) in cases {
         let text = format!(

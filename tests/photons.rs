@@ -100,6 +100,9 @@ fn numbers(k: u32) -> PhotonNumbers {
 const CAMERA: &str =
     r#""camera": (transform: (translation: (0, 3, 9), look_at: (0, 0, 0)), camera: ())"#;
 
+/// A ball of radius ½ from rational curves.
+const TURNED: &str = "shape: Revolution(profile: Bezier(points: [(0, -0.5), (0.2928932188134524, -0.5), (0.5, -0.2928932188134524), (0.5, 0), (0.5, 0.2928932188134524), (0.2928932188134524, 0.5), (0, 0.5)], weights: [1, 0.8047378541243649, 0.8047378541243649, 1, 0.8047378541243649, 0.8047378541243649, 1])), emission: Radiance((3, 3, 3))";
+
 /// Oracles: the flux of each light in closed form; for those far away, through the disk of the sphere
 /// around a ball of radius 1 (its box has the half diagonal √3).
 #[test]
@@ -118,6 +121,7 @@ fn emitted_photons_carry_the_flux_of_every_light() {
             r"shape: Disk(radius: 0.5), two_sided: true, emission: Radiance((3, 3, 3))",
             14.804_406_6,
         ),
+        ("turned", TURNED, 29.608_813_2),
         ("power", r"shape: Cone(), emission: Power((7, 7, 7))", 7.0),
         ("texture", r#"shape: Rectangle(size: (2, 1)), emission: Radiance("checks")"#, PI),
         ("stretched", r"shape: Sphere(), emission: Power((5, 5, 5))", 5.0),

@@ -1,11 +1,11 @@
-//! How fast the renderer is, in one table: rays, builds, samples, frames, and how they grow.
+//! How fast the renderer is, in one table: rays, surfaces of revolution, builds, samples, frames, and how they grow.
 //!
 //! `cargo bench --bench speed` runs everything but the convergence; after `--`:
 //!
 //! ```text
 //! --quick         smaller meshes, fewer repetitions
 //! --json FILE     the same numbers by the same names
-//! --only A,B      of rays, build, shapes, motion, samples, frame, growth
+//! --only A,B      of rays, revolution, build, shapes, motion, samples, frame, growth
 //! --convergence   CPU-seconds of whole renders to a relMSE of 1e-3, and their memory
 //! ```
 //!
@@ -20,6 +20,7 @@ mod growth;
 mod motion;
 mod rays;
 mod report;
+mod revolution;
 mod samples;
 mod shapes;
 
@@ -84,8 +85,9 @@ fn main() -> ExitCode {
         }
     };
     let mut report = Report::default();
-    let sections: [(&str, fn(&Options, &mut Report)); 7] = [
+    let sections: [(&str, fn(&Options, &mut Report)); 8] = [
         ("rays", rays::run),
+        ("revolution", revolution::run),
         ("build", builds::run),
         ("shapes", shapes::run),
         ("motion", motion::run),

@@ -14,7 +14,6 @@ mod relief;
 mod surface_net;
 mod textures;
 mod water;
-mod wine_glass;
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType, Rgb};
@@ -52,14 +51,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The meshes with their files: fine ones for pictures, and a coarse rabbit whose facets show.
-fn meshes() -> [(&'static str, glb::Mesh); 5] {
+fn meshes() -> [(&'static str, glb::Mesh); 3] {
     let (rabbit, fish) = (figure::rabbit(), figure::fish());
     [
         ("rabbit.glb", surface_net::surface_net(&rabbit, 0.0122)),
         ("rabbit-coarse.glb", surface_net::surface_net(&rabbit, 0.045)),
         ("fish.glb", surface_net::surface_net(&fish, 0.004)),
-        ("wine-glass.glb", wine_glass::glass()),
-        ("wine.glb", wine_glass::wine()),
     ]
 }
 

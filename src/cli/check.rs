@@ -146,6 +146,7 @@ fn shape_name(shape: &Shape<String>) -> &'static str {
         Shape::Box { .. } => "box",
         Shape::Cylinder { .. } => "cylinder",
         Shape::Cone { .. } => "cone",
+        Shape::Revolution { .. } => "surface of revolution",
         Shape::Mesh(_) => "mesh",
     }
 }

@@ -8,6 +8,7 @@ mod material;
 pub mod modelling;
 mod motion;
 mod photons;
+mod profile;
 mod read;
 mod scene;
 mod settings;
@@ -24,6 +25,7 @@ pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
 pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
+pub use profile::{Curve, CurveError};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{Displacement, EntityDescription, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};

@@ -1,8 +1,11 @@
 //! Shapes, as a scene file says them.
 
 use super::Rgb;
+use super::profile::built;
+use crate::math::Profile;
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
+use std::sync::Arc;
 
 /// A shape in its own space, metres. `R` refers to a mesh.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -58,6 +61,15 @@ pub enum Shape<R> {
         #[serde(default = "yes")]
         capped: bool,
     },
+    /// A plane curve turned around the y axis.
+    Revolution {
+        /// What is turned, a [`Curve`](super::Curve) in a file: (radius, height) in metres.
+        #[serde(deserialize_with = "built")]
+        profile: Arc<Profile>,
+        /// Whether ends of the curve which are not on the axis are closed by disks.
+        #[serde(default)]
+        capped: bool,
+    },
     /// A triangle mesh by its name in `meshes:`.
     Mesh(R),
 }
@@ -76,6 +88,7 @@ impl<R> Shape<R> {
             Self::Box { size } => Shape::Box { size },
             Self::Cylinder { radius, height, capped } => Shape::Cylinder { radius, height, capped },
             Self::Cone { radius, height, capped } => Shape::Cone { radius, height, capped },
+            Self::Revolution { profile, capped } => Shape::Revolution { profile, capped },
             Self::Mesh(reference) => Shape::Mesh(f(reference)?),
         })
     }

@@ -3,7 +3,7 @@
 use super::Meshes;
 use crate::math::{Aabb, MotionTransform, swept_bounds};
 use crate::shade::TextureNeeds;
-use crate::shape::Primitive;
+use crate::shape::{Primitive, Revolution};
 use crate::world::{Shape, ShutterMotion};
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec3};
 pub const NOTHING: u32 = u32::MAX;
 
 /// The form of an instance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// An analytic shape in its canonical space.
     Primitive(Primitive),
@@ -95,6 +95,10 @@ pub(super) fn placed(
         Shape::Cone { radius, height, capped } => {
             canonical(Primitive::Cone { capped }, DVec3::new(radius, height, radius))
         }
+        Shape::Revolution { ref profile, capped } => {
+            let turned = Revolution::new(profile.clone(), capped);
+            canonical(Primitive::Revolution(turned), DVec3::ONE)
+        }
         Shape::Mesh(mesh) => {
             let (slot, bounds) = meshes.slot(mesh)?;
             (Geometry::Mesh(slot), DVec3::ONE, bounds)
@@ -122,7 +126,8 @@ pub(super) fn placed(
 }
 
 fn canonical(primitive: Primitive, scale: DVec3) -> (Geometry, DVec3, Aabb) {
-    (Geometry::Primitive(primitive), scale, primitive.bounds())
+    let bounds = primitive.bounds();
+    (Geometry::Primitive(primitive), scale, bounds)
 }
 
 #[cfg(test)]

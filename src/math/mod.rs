@@ -1,9 +1,12 @@
 //! Frames, bounds, rounding bounds and rigid motion: geometry that knows nothing of light.
 
+mod bernstein;
 mod bounds;
 mod cone;
+mod cubic;
 mod frame;
 mod motion;
+pub(crate) mod profile;
 mod ray;
 
 mod rounding;
@@ -11,8 +14,11 @@ mod swept;
 
 pub use bounds::Aabb;
 pub use cone::Cone;
+pub use cubic::{Cubic, clamped_knots, spline};
 pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
+pub(crate) use profile::bracketed_root;
+pub use profile::{Jet, Piece, Profile, ProfileError};
 pub use ray::Ray;
 
 pub use rounding::{gamma, gamma_f64, offset_ray_origin};

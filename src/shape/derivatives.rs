@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 impl Primitive {
     /// `∂p/∂u` and `∂p/∂v` at a point of `face`, in canonical space. At the poles of a sphere and the tip of
     /// a cone one of them is 0, or has no limit.
-    pub fn derivatives(self, p: DVec3, face: u32) -> [DVec3; 2] {
+    pub fn derivatives(&self, p: DVec3, face: u32) -> [DVec3; 2] {
         let around = DVec3::new(p.z, 0.0, -p.x) * TAU;
         let cap = |y: f64| [DVec3::X * 2.0, DVec3::Z * (-2.0 * y.signum())];
         match (self, face) {
@@ -29,6 +29,7 @@ impl Primitive {
                 let radial = DVec3::new(p.x, 0.0, p.z).normalize_or(DVec3::Z);
                 [around, DVec3::new(-radial.x, 1.0, -radial.z)]
             }
+            (Self::Revolution(revolution), face) => revolution.derivatives(p, face),
         }
     }
 }
@@ -36,12 +37,18 @@ impl Primitive {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{Cubic, Profile};
     use crate::sampling::Sampler;
-    use glam::DAffine3;
+    use crate::shape::Revolution;
+    use glam::{DAffine3, DVec2};
+    use std::sync::Arc;
 
     /// Oracle: uv of points a little further along each derivative, on every face of every shape.
     #[test]
     fn uv_grows_by_one_along_its_derivative() {
+        let [a, b] = [(0.3, -0.5), (0.6, 0.4)].map(DVec2::from);
+        let bend = [a, DVec2::new(1.1, -0.2), DVec2::new(0.2, 0.1), b];
+        let vase = Profile::new(&[Cubic::new(bend, [1.0; 4])]).expect("a valid profile");
         let shapes = [
             Primitive::Sphere,
             Primitive::Rectangle,
@@ -49,6 +56,7 @@ mod tests {
             Primitive::Cuboid,
             Primitive::Cylinder { capped: true },
             Primitive::Cone { capped: true },
+            Primitive::Revolution(Revolution::new(Arc::new(vase), true)),
         ];
         let step = 1e-4;
         for shape in shapes {

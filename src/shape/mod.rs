@@ -13,10 +13,12 @@ mod derivatives;
 mod disk;
 mod plane;
 mod rectangle;
+mod revolution;
 mod sphere;
 mod triangle;
 
 pub use rectangle::{RectangleSampler, sample_solid_angle as sample_rectangle};
+pub use revolution::Revolution;
 pub use sphere::{ConeOfSphere, sample_cone as sample_sphere};
 pub use triangle::{TriangleTest, area_of as triangle_area, sample_triangle, triangle_pdf};
 
@@ -64,6 +66,8 @@ pub struct LocalSurface {
     pub dpdu: DVec3,
     /// Colour of a mesh, interpolated between its corners; 1 of all else.
     pub color: Rgb,
+    /// Bound per axis of the error of the point, beyond the rounding of its coordinates.
+    pub error: f64,
 }
 
 impl LocalSurface {
@@ -75,6 +79,7 @@ impl LocalSurface {
             uv: Vec2::new(uv.0 as f32, uv.1 as f32),
             dpdu,
             color: Rgb::ONE,
+            error: 0.0,
         }
     }
 }
@@ -91,7 +96,7 @@ pub struct CanonicalPoint {
 }
 
 /// An analytic shape in its canonical space.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Primitive {
     /// Radius 1 around the origin, poles on y.
     Sphere,
@@ -113,11 +118,13 @@ pub enum Primitive {
         /// Whether the base is closed.
         capped: bool,
     },
+    /// A profile turned around y; its space has the unit of the profile.
+    Revolution(Revolution),
 }
 
 impl Primitive {
     /// The box around the shape; not finite for a plane.
-    pub fn bounds(self) -> Aabb {
+    pub fn bounds(&self) -> Aabb {
         let half = Vec3::splat(0.5);
         let (min, max) = match self {
             Self::Sphere => (Vec3::NEG_ONE, Vec3::ONE),
@@ -128,27 +135,29 @@ impl Primitive {
             Self::Cylinder { .. } | Self::Cone { .. } => {
                 (Vec3::new(-1.0, -0.5, -1.0), Vec3::new(1.0, 0.5, 1.0))
             }
+            Self::Revolution(revolution) => return revolution.bounds(),
         };
         Aabb { min, max }
     }
 
     /// The nearest hit with `0 < t < t_max`.
     #[inline]
-    pub fn intersect(self, ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
+    pub fn intersect(&self, ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
         match self {
             Self::Sphere => sphere::intersect(ray, t_max),
             Self::Rectangle => rectangle::intersect(ray, t_max),
             Self::Disk => disk::intersect(ray, t_max),
             Self::Plane => plane::intersect(ray, t_max),
             Self::Cuboid => cuboid::intersect(ray, t_max),
-            Self::Cylinder { capped } => cylinder::intersect(ray, t_max, capped),
-            Self::Cone { capped } => cone::intersect(ray, t_max, capped),
+            Self::Cylinder { capped } => cylinder::intersect(ray, t_max, *capped),
+            Self::Cone { capped } => cone::intersect(ray, t_max, *capped),
+            Self::Revolution(revolution) => revolution.intersect(ray, t_max),
         }
     }
 
-    /// The surface at a point on (or within rounding of) the given face. A sphere's uv takes inverse
-    /// trigonometric functions; they are left out, and uv is 0, unless `needs_uv`.
-    pub fn surface(self, p: DVec3, face: u32, needs_uv: bool) -> LocalSurface {
+    /// The surface at a point on (or within rounding of) the given face. The uv of round shapes takes inverse
+    /// trigonometric functions; for spheres and revolutions they are left out, and uv is 0, unless `needs_uv`.
+    pub fn surface(&self, p: DVec3, face: u32, needs_uv: bool) -> LocalSurface {
         match self {
             Self::Sphere => sphere::surface(p, needs_uv),
             Self::Rectangle => rectangle::surface(p),
@@ -157,6 +166,7 @@ impl Primitive {
             Self::Cuboid => cuboid::surface(p, face),
             Self::Cylinder { .. } => cylinder::surface(p, face),
             Self::Cone { .. } => cone::surface(p, face),
+            Self::Revolution(revolution) => revolution.surface(p, face, needs_uv),
         }
     }
 
@@ -164,39 +174,43 @@ impl Primitive {
     ///
     /// Faces are chosen by their area under `world_from_shape`; within a face the density is even in
     /// canonical area. `None` for a plane, which has no finite area.
-    pub fn sample(self, u: Vec2, world_from_shape: &DAffine3) -> Option<CanonicalPoint> {
+    pub fn sample(&self, u: Vec2, world_from_shape: &DAffine3) -> Option<CanonicalPoint> {
         match self {
             Self::Sphere => Some(sphere::sample(u)),
             Self::Rectangle => Some(rectangle::sample(u)),
             Self::Disk => Some(disk::sample(u)),
             Self::Plane => None,
             Self::Cuboid => Some(cuboid::sample(u, world_from_shape)),
-            Self::Cylinder { capped } => Some(cylinder::sample(u, world_from_shape, capped)),
-            Self::Cone { capped } => Some(cone::sample(u, world_from_shape, capped)),
+            Self::Cylinder { capped } => Some(cylinder::sample(u, world_from_shape, *capped)),
+            Self::Cone { capped } => Some(cone::sample(u, world_from_shape, *capped)),
+            Self::Revolution(revolution) => Some(revolution.sample(u)),
         }
     }
 
     /// The density of [`Primitive::sample`] at a point of `face`, per unit of canonical area.
-    pub fn pdf_area(self, face: u32, world_from_shape: &DAffine3) -> f64 {
+    pub fn pdf_area(&self, face: u32, world_from_shape: &DAffine3) -> f64 {
         match self {
             Self::Sphere => sphere::PDF_AREA,
             Self::Rectangle => 1.0,
             Self::Disk => disk::PDF_AREA,
             Self::Plane => 0.0,
             Self::Cuboid => cuboid::face_probabilities(world_from_shape)[face as usize],
-            Self::Cylinder { capped } => cylinder::pdf_area(face, world_from_shape, capped),
-            Self::Cone { capped } => cone::pdf_area(face, world_from_shape, capped),
+            Self::Cylinder { capped } => cylinder::pdf_area(face, world_from_shape, *capped),
+            Self::Cone { capped } => cone::pdf_area(face, world_from_shape, *capped),
+            Self::Revolution(revolution) => revolution.pdf_area(),
         }
     }
 
     /// The area of the shape in the world, square metres; infinite for a plane.
     ///
     /// The mean of the map's area factor over the surface: exact where it is constant on a face,
-    /// otherwise a rule of 256² points, good to about six digits.
-    pub fn world_area(self, world_from_shape: &DAffine3) -> f64 {
+    /// otherwise a rule of 256² points, good to about six digits; of a revolution, of Gauss's points along its profile.
+    pub fn world_area(&self, world_from_shape: &DAffine3) -> f64 {
         const N: u32 = 256;
-        if self == Self::Plane {
-            return f64::INFINITY;
+        match self {
+            Self::Plane => return f64::INFINITY,
+            Self::Revolution(revolution) => return revolution.world_area(world_from_shape),
+            _ => {}
         }
         let flat = matches!(self, Self::Rectangle | Self::Disk);
         let n = if flat { 1 } else { N };

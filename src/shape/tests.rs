@@ -1,20 +1,35 @@
 //! Tests which hold for several shapes.
 
 use super::*;
+use crate::math::{Cubic, Profile};
 use crate::sampling::Sampler;
 use glam::{DQuat, DVec2};
+use std::sync::Arc;
 
-const SOLIDS: [Primitive; 4] = [
-    Primitive::Sphere,
-    Primitive::Cuboid,
-    Primitive::Cylinder { capped: true },
-    Primitive::Cone { capped: true },
-];
+/// Corners of a turned solid, (radius, height), from the lowest to the highest.
+const TURNED: [DVec2; 4] =
+    [DVec2::new(0.5, -0.5), DVec2::new(1.0, 0.0), DVec2::new(0.2, 0.3), DVec2::new(0.4, 0.6)];
+
+fn solids() -> [Primitive; 5] {
+    let lines: Vec<Cubic> = TURNED.windows(2).map(|p| Cubic::line(p[0], p[1])).collect();
+    let profile = Profile::new(&lines).expect("off its axis");
+    [
+        Primitive::Sphere,
+        Primitive::Cuboid,
+        Primitive::Cylinder { capped: true },
+        Primitive::Cone { capped: true },
+        Primitive::Revolution(Revolution::new(Arc::new(profile), true)),
+    ]
+}
 
 /// Whether `p` lies inside the solid: the defining inequality.
-fn inside(shape: Primitive, p: DVec3) -> bool {
+fn inside(shape: &Primitive, p: DVec3) -> bool {
     let r2 = p.x * p.x + p.z * p.z;
     match shape {
+        Primitive::Revolution(_) => TURNED.windows(2).any(|ends| {
+            let share = (p.y - ends[0].y) / (ends[1].y - ends[0].y);
+            (0.0..1.0).contains(&share) && r2.sqrt() < ends[0].lerp(ends[1], share).x
+        }),
         Primitive::Sphere => p.length_squared() < 1.0,
         Primitive::Cuboid => p.abs().max_element() < 0.5,
         Primitive::Cylinder { .. } => r2 < 1.0 && p.y.abs() < 0.5,
@@ -40,7 +55,7 @@ fn random_vector(next: &mut impl FnMut() -> f64) -> DVec3 {
 /// side where it began, just behind it it is on the other.
 #[test]
 fn the_hit_is_where_the_ray_first_crosses_the_surface() {
-    for shape in SOLIDS {
+    for shape in &solids() {
         let mut hits = 0;
         for k in 0..4000 {
             let mut next = random(k);
@@ -69,7 +84,7 @@ fn the_hit_is_where_the_ray_first_crosses_the_surface() {
 #[test]
 fn degenerate_rays_do_not_make_nan() {
     let components = [0.0, -0.0, 1.0, -1.0, 1e-30, 1e-5, 0.5];
-    for shape in [Primitive::Rectangle, Primitive::Disk, Primitive::Plane].iter().chain(&SOLIDS) {
+    for shape in [Primitive::Rectangle, Primitive::Disk, Primitive::Plane].iter().chain(&solids()) {
         for &x in &components {
             for &y in &components {
                 for &z in &components {
@@ -118,6 +133,13 @@ fn a_huge_sphere_underfoot_is_met_where_it_should_be() {
     assert!((t - 1.250_000_35).abs() < 1e-7, "{t}");
 }
 
+/// Radius 1, from −½ to ½.
+fn turned_cylinder() -> Primitive {
+    let line = Cubic::line(DVec2::new(1.0, -0.5), DVec2::new(1.0, 0.5));
+    let profile = Profile::new(&[line]).expect("off its axis");
+    Primitive::Revolution(Revolution::new(Arc::new(profile), true))
+}
+
 /// Oracles: areas in closed form under a map which stretches the axes.
 #[test]
 fn areas_agree_with_their_closed_forms() {
@@ -141,6 +163,7 @@ fn areas_agree_with_their_closed_forms() {
         (Primitive::Cylinder { capped: false }, tall, 2.0 * PI * 2.0 * 3.0),
         (Primitive::Cylinder { capped: true }, tall, 2.0 * PI * 2.0 * 3.0 + 2.0 * PI * 4.0),
         (Primitive::Cone { capped: true }, tall, PI * 2.0 * slant + PI * 4.0),
+        (turned_cylinder(), tall, 2.0 * PI * 2.0 * 3.0 + 2.0 * PI * 4.0),
     ] {
         let area = shape.world_area(&m);
         assert!((area / expected - 1.0).abs() < 1e-5, "{shape:?}: {area} against {expected}");
@@ -152,7 +175,7 @@ fn areas_agree_with_their_closed_forms() {
 #[test]
 fn points_are_drawn_on_the_surface() {
     let m = DAffine3::from_scale(DVec3::new(1.0, 2.0, 0.5));
-    for shape in SOLIDS.iter().chain(&[Primitive::Rectangle, Primitive::Disk]) {
+    for shape in solids().iter().chain(&[Primitive::Rectangle, Primitive::Disk]) {
         for k in 0..500 {
             let u = Sampler::new(3, 0, (k, 0), 0).two(0);
             let point = shape.sample(u, &m).expect("finite area");

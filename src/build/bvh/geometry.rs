@@ -217,7 +217,7 @@ impl SceneGeometry<'_> {
         t_max: f64,
     ) -> Option<Hit> {
         let local = to_instance::<MOTION>(instance, ray);
-        match instance.geometry {
+        match &instance.geometry {
             Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).map(|hit| Hit {
                 t: hit.t,
                 instance: index,
@@ -225,7 +225,7 @@ impl SceneGeometry<'_> {
                 weights: DVec2::ZERO,
             }),
             Geometry::Mesh(mesh) => {
-                let hit = self.meshes[mesh as usize].closest_hit(&local, ray.time, t_max)?;
+                let hit = self.meshes[*mesh as usize].closest_hit(&local, ray.time, t_max)?;
                 let (primitive, weights) = (hit.triangle, hit.weights);
                 Some(Hit { t: hit.t, instance: index, primitive, weights })
             }
@@ -236,9 +236,9 @@ impl SceneGeometry<'_> {
     #[inline]
     fn blocks<const MOTION: bool>(&self, instance: &Instance, ray: &Ray, t_max: f64) -> bool {
         let local = to_instance::<MOTION>(instance, ray);
-        match instance.geometry {
+        match &instance.geometry {
             Geometry::Primitive(primitive) => primitive.intersect(&local, t_max).is_some(),
-            Geometry::Mesh(mesh) => self.meshes[mesh as usize].any_hit(&local, ray.time, t_max),
+            Geometry::Mesh(mesh) => self.meshes[*mesh as usize].any_hit(&local, ray.time, t_max),
         }
     }
 }

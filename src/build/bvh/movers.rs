@@ -105,9 +105,9 @@ pub(super) fn mover(index: u32, instance: &Instance, mesh_bounds: &[Aabb]) -> Op
     if instance.motion.is_static() || !instance.bounds.min.is_finite() {
         return None;
     }
-    let own = match instance.geometry {
+    let own = match &instance.geometry {
         Geometry::Primitive(primitive) => primitive.bounds(),
-        Geometry::Mesh(mesh) => *mesh_bounds.get(mesh as usize)?,
+        Geometry::Mesh(mesh) => *mesh_bounds.get(*mesh as usize)?,
     };
     let at = |time| swept_bounds(&own, &instance.motion, time, time).area();
     let far = instance.bounds.area() > FAR * at(0.0).midpoint(at(1.0));

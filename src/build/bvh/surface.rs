@@ -36,6 +36,7 @@ impl SurfacePoint {
         let back = rounding_error(inverse, p);
         let m = &forward.matrix3;
         let p_error = rounding_error(forward, local.p)
+            + (m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs()) * local.error
             + m.x_axis.abs() * back.x
             + m.y_axis.abs() * back.y
             + m.z_axis.abs() * back.z;
@@ -67,19 +68,19 @@ impl SceneGeometry<'_> {
     /// The surface where `ray` hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let instance = &self.instances[hit.instance as usize];
-        if let (Some(joined), Geometry::Mesh(mesh)) = (&self.top.joined, instance.geometry)
+        if let (Some(joined), Geometry::Mesh(mesh)) = (&self.top.joined, &instance.geometry)
             && let Some(first) = joined.members.first_triangle(hit.instance)
         {
-            return joined.surface(&self.meshes[mesh as usize], first, hit, instance);
+            return joined.surface(&self.meshes[*mesh as usize], first, hit, instance);
         }
         let surface = |forward: &DAffine3, inverse: &DAffine3| {
-            let local = match instance.geometry {
+            let local = match &instance.geometry {
                 Geometry::Primitive(primitive) => {
                     let p = inverse.transform_point3(ray.at(hit.t));
                     primitive.surface(p, hit.primitive, instance.needs_uv)
                 }
                 Geometry::Mesh(mesh) => {
-                    let mesh = &self.meshes[mesh as usize];
+                    let mesh = &self.meshes[*mesh as usize];
                     mesh.surface(hit.primitive, hit.weights, ray.time, instance.needs_uv)
                 }
             };
@@ -152,7 +153,7 @@ impl MeshTree {
         } else {
             (Vec2::ZERO, DVec3::ZERO, Rgb::ONE)
         };
-        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu, color }
+        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu, color, error: 0.0 }
     }
 }
 

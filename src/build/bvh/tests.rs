@@ -55,7 +55,7 @@ fn assert_each_is_found(instances: &[Instance], top: &TopLevel, times: &[f32], r
         for from_camera in [false, true] {
             let mut nearest: Option<(f64, u32, u32)> = None;
             for (index, instance) in (0..).zip(instances) {
-                let Geometry::Primitive(primitive) = instance.geometry else { continue };
+                let Geometry::Primitive(primitive) = &instance.geometry else { continue };
                 let inverse = instance.motion.inverse_at(ray.time);
                 let local = LocalRay {
                     o: inverse.transform_point3(ray.o.as_dvec3()),

@@ -130,12 +130,12 @@ impl SceneGeometry<'_> {
     pub fn derivatives(&self, hit: &Hit, surface: &SurfacePoint, time: f32) -> Option<[DVec3; 2]> {
         let instance = &self.instances[hit.instance as usize];
         let (forward, inverse) = instance.motion.both_at(time);
-        let local = match instance.geometry {
+        let local = match &instance.geometry {
             Geometry::Primitive(primitive) => {
                 primitive.derivatives(inverse.transform_point3(surface.p), hit.primitive)
             }
             Geometry::Mesh(mesh) => {
-                let tree = &self.meshes[mesh as usize];
+                let tree = &self.meshes[*mesh as usize];
                 let facet = Facet::new(tree.corners(hit.primitive, time), hit.weights);
                 facet.derivatives(&tree.mesh, hit.primitive)?
             }

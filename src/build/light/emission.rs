@@ -132,7 +132,7 @@ impl Emission<'_> {
     /// From an analytic shape: a point evenly by canonical area, a direction by the cosine.
     fn shape(&self, instance: u32) -> Option<EmittedPhoton> {
         let object = &self.lights.geometry.instances[instance as usize];
-        let Geometry::Primitive(shape) = object.geometry else { return None };
+        let Geometry::Primitive(shape) = &object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(self.time);
         let point = shape.sample(self.numbers.point, &map)?;
         let local = shape.surface(point.p, point.face, object.needs_uv);

@@ -28,7 +28,7 @@ pub(super) enum ShapeLight {
 impl ShapeLight {
     fn new(instance: &Instance) -> Self {
         let (Geometry::Primitive(primitive), MotionTransform::Static { forward, inverse }) =
-            (instance.geometry, &instance.motion)
+            (&instance.geometry, &instance.motion)
         else {
             return Self::Other;
         };

@@ -201,7 +201,7 @@ impl Builder<'_> {
                 (Some(triangles(tree, &map)), !tree.deforms())
             }
         };
-        let area = match (&triangles, instance.geometry) {
+        let area = match (&triangles, &instance.geometry) {
             (None, Geometry::Primitive(primitive)) => primitive.world_area(&map),
             (triangles, _) => triangles.iter().flatten().map(|triangle| triangle.area).sum(),
         };

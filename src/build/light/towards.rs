@@ -127,7 +127,7 @@ enum ShapeSampling {
 
 impl ShapeSampling {
     /// The best way for `primitive` under `map` as seen from `from`.
-    fn choose(primitive: Primitive, map: &DAffine3, from: &Receiver) -> Self {
+    fn choose(primitive: &Primitive, map: &DAffine3, from: &Receiver) -> Self {
         let m = &map.matrix3;
         let p = from.p;
         match primitive {
@@ -232,7 +232,7 @@ impl Lights<'_> {
         }
         let object = &self.geometry.instances[instance as usize];
         let map = object.motion.at(time);
-        let (emitter, pdf) = match object.geometry {
+        let (emitter, pdf) = match &object.geometry {
             Geometry::Primitive(shape) => {
                 let pdf = match ShapeSampling::choose(shape, &map, from) {
                     ShapeSampling::Cone { cone } => cone.pdf(),
@@ -322,7 +322,7 @@ impl Lights<'_> {
             ShapeLight::Other => {}
         }
         let object = &self.geometry.instances[instance as usize];
-        let Geometry::Primitive(shape) = object.geometry else { return None };
+        let Geometry::Primitive(shape) = &object.geometry else { return None };
         let (map, inverse) = object.motion.both_at(time);
         let (local, face, pdf) = match ShapeSampling::choose(shape, &map, from) {
             ShapeSampling::Cone { cone } => {

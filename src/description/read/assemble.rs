@@ -5,6 +5,7 @@ use super::files;
 use super::limits;
 use super::outline::Kind;
 use super::overrides::FIELDS;
+use super::profile::read_profile;
 use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
 use super::waves::check_waves;
@@ -16,6 +17,7 @@ use crate::description::{
     Clock, Displacement, Encoding, Filter, ImageData, PhotonSettings, RenderSettings,
     SceneDescription, SceneTexture, Texture, TriangleMesh, Waves,
 };
+use crate::math::Profile;
 use indexmap::IndexMap;
 use indexmap::map::Entry;
 use std::collections::{HashMap, HashSet};
@@ -50,6 +52,7 @@ pub(super) fn assemble(
     // What could not be gathered may hold the names that seem to be missing.
     let complete = complete && !report.found.0.iter().any(|d| d.code == "scene::structure");
     definitions.names.complete = complete;
+    definitions.names.made = made_profiles(&definitions.names.profiles, report);
     let names = &definitions.names;
     let mut scene = SceneDescription { files, ..SceneDescription::default() };
     let clock: Vec<_> = definitions.clock.values().cloned().collect();
@@ -99,6 +102,15 @@ pub(super) fn assemble(
     } else {
         Ok(scene)
     }
+}
+
+/// The profiles which can be made.
+fn made_profiles(
+    profiles: &IndexMap<String, Cursor>,
+    report: &mut Report,
+) -> HashMap<String, Arc<Profile>> {
+    let made = profiles.iter().map(|(name, cursor)| (name, read_profile(cursor, report)));
+    made.filter_map(|(name, profile)| Some((name.clone(), profile?))).collect()
 }
 
 /// The mistakes of each text together and in its order; those without a place at the end.
@@ -180,6 +192,7 @@ fn gather<'a>(root: &Cursor<'a>, definitions: &mut Definitions<'a>, report: &mut
             "render" => gather_fields(&part, &mut definitions.render, report),
             "textures" => gather_names(&part, &mut names.textures, report),
             "materials" => gather_names(&part, &mut names.materials, report),
+            "profiles" => gather_names(&part, &mut names.profiles, report),
             "meshes" => gather_names(&part, &mut names.meshes, report),
             "entities" => gather_names(&part, &mut names.entities, report),
             other => {

@@ -36,6 +36,8 @@ pub(super) const LENGTH_OR_ZERO: Limits = closed(0.0, 1e15, "metres");
 pub(super) const ANGLE: Limits = closed(-1e9, 1e9, "degrees");
 /// Factors along an axis.
 pub(super) const SCALE: Limits = closed(-1e12, 1e12, "");
+/// Weights of the points of a curve; only their ratios count.
+pub(super) const WEIGHT: Limits = closed(1e-6, 1e6, "");
 /// Directions; only their direction counts.
 pub(super) const DIRECTION: Limits = closed(-1e15, 1e15, "");
 /// Times of keys.

@@ -17,6 +17,7 @@ mod limits;
 mod motion;
 mod outline;
 mod overrides;
+mod profile;
 mod relations;
 mod source;
 mod surface;
@@ -26,10 +27,12 @@ mod waves;
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
 use super::scene::SceneDescription;
+use crate::math::Profile;
 use decode::Report;
 use files::{FileError, MAX_SCENE_BYTES};
 use indexmap::IndexMap;
 use source::{Cursor, Source};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use xxhash_rust::xxh3::Xxh3;
@@ -102,6 +105,9 @@ struct Names<'a> {
     complete: bool,
     textures: IndexMap<String, Cursor<'a>>,
     materials: IndexMap<String, Cursor<'a>>,
+    profiles: IndexMap<String, Cursor<'a>>,
+    /// Those of the profiles in which nothing is wrong.
+    made: HashMap<String, Arc<Profile>>,
     meshes: IndexMap<String, Cursor<'a>>,
     entities: IndexMap<String, Cursor<'a>>,
 }

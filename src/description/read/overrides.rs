@@ -12,10 +12,19 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// The parts of a scene which are maps from names.
-pub(super) const MAPS: [&str; 4] = ["textures", "materials", "meshes", "entities"];
+pub(super) const MAPS: [&str; 5] = ["textures", "materials", "profiles", "meshes", "entities"];
 /// All fields of a scene.
-pub(super) const FIELDS: [&str; 8] =
-    ["include", "clock", "render", "camera", "textures", "materials", "meshes", "entities"];
+pub(super) const FIELDS: [&str; 9] = [
+    "include",
+    "clock",
+    "render",
+    "camera",
+    "textures",
+    "materials",
+    "profiles",
+    "meshes",
+    "entities",
+];
 
 /// How far a path leads into the text.
 struct Reached {

@@ -9,8 +9,10 @@ use crate::description::{
     EmissionStrength, Encoding, ImagePixels, Light, Material, Rgb, SceneDescription, SceneTexture,
     Shape, Texture, Value,
 };
+use crate::math::Profile;
 use indexmap::IndexMap;
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 /// Reports entities which are their own ancestors, and materials and textures made of themselves.
 pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
@@ -264,17 +266,25 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
     let mut used = HashSet::new();
     for entity in scene.entities.values() {
         used.extend(entity.material.iter().map(|name| ("material", name.clone())));
-        if let Some(Shape::Mesh(name)) = &entity.shape {
-            let mut of = Some(name.clone());
-            while let Some(name) = of {
-                let height = scene.displacements.get(&name).map(|by| by.height.clone());
-                used.extend(height.map(|height| ("texture", height)));
-                let part = names.meshes.get(&name).and_then(|mesh| mesh.field("of"));
-                of = part.map(|part| super::outline::unquoted(part.text()));
-                if !used.insert(("mesh", name)) {
-                    break;
+        match &entity.shape {
+            Some(Shape::Mesh(name)) => {
+                let mut of = Some(name.clone());
+                while let Some(name) = of {
+                    let height = scene.displacements.get(&name).map(|by| by.height.clone());
+                    used.extend(height.map(|height| ("texture", height)));
+                    let part = names.meshes.get(&name).and_then(|mesh| mesh.field("of"));
+                    of = part.map(|part| super::outline::unquoted(part.text()));
+                    if !used.insert(("mesh", name)) {
+                        break;
+                    }
                 }
             }
+            Some(Shape::Revolution { profile, .. }) => {
+                let is_it = |made: &&Arc<Profile>| Arc::ptr_eq(made, profile);
+                let name = names.made.iter().find(|(_, made)| is_it(made));
+                used.extend(name.map(|(name, _)| ("profile", name.clone())));
+            }
+            _ => {}
         }
         let emitted = entity.emission.as_ref().and_then(|emission| match &emission.strength {
             EmissionStrength::Radiance(value) => value.texture(),
@@ -322,8 +332,12 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
         }
     }
     let mut warnings = Vec::new();
-    let kinds =
-        [("texture", &names.textures), ("material", &names.materials), ("mesh", &names.meshes)];
+    let kinds = [
+        ("texture", &names.textures),
+        ("material", &names.materials),
+        ("profile", &names.profiles),
+        ("mesh", &names.meshes),
+    ];
     for (kind, defined) in kinds {
         for (name, cursor) in defined {
             if !used.contains(&(kind, name.clone())) {

@@ -3,6 +3,7 @@
 use super::Names;
 use super::decode::{Report, decode};
 use super::limits::{self, Limits};
+use super::profile::read_revolution;
 use super::source::Cursor;
 use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
@@ -442,6 +443,9 @@ pub(super) fn read_shape(
     names: &Names,
     report: &mut Report,
 ) -> Option<Shape<String>> {
+    if cursor.name() == "Revolution" {
+        return read_revolution(cursor, names, report);
+    }
     let shape: Shape<String> = decode(cursor, report)?;
     let length = &limits::LENGTH;
     match &shape {
@@ -451,7 +455,7 @@ pub(super) fn read_shape(
         Shape::Rectangle { size } => {
             limits::vector(report, &cursor.at("size"), &size.to_array(), length);
         }
-        Shape::Plane {} => {}
+        Shape::Plane {} | Shape::Revolution { .. } => {}
         Shape::Box { size } => {
             limits::vector(report, &cursor.at("size"), &size.to_array(), length);
         }

@@ -697,3 +697,98 @@ fn mistakes_in_water_are_told_with_their_place() {
     // a·k = 0.5·(2π)²/9.81 = 2.01
     insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), steepness: 0.7, waves: [(amplitude: 0.5, frequency: 1)]"), @"scene.ron:2:77: the surface may fold over itself: `steepness` times the sum of amplitude times wave number is 1.409, and must be at most 1");
 }
+
+#[test]
+fn a_wrong_profile_is_told_with_its_place() {
+    let turned =
+        |profile: &str| mistakes(&with_entity(&format!("shape: Revolution(profile: {profile})")));
+    insta::assert_snapshot!(turned("Bezier(points: [(1, 0)])"), @r#"
+    error[scene::profile]: `Bezier` needs 3·n + 1 points (4, 7, 10, …), but there are 1
+     --> scene.ron:2:50
+      |
+    2 | "it": (shape: Revolution(profile: Bezier(points: [(1, 0)])))})
+      |                                                  ^^^^^^^^ entities.it.shape.Revolution.profile.Bezier.points
+    "#);
+    insta::assert_snapshot!(turned("Lines(points: [(1, 1), (1, 1), (1, 1)])"), @r#"
+    error[scene::profile]: no surface comes of this profile
+     --> scene.ron:2:49
+      |
+    2 | "it": (shape: Revolution(profile: Lines(points: [(1, 1), (1, 1), (1, 1)])))})
+      |                                                 ^^^^^^^^^^^^^^^^^^^^^^^^ entities.it.shape.Revolution.profile.Lines.points
+      |
+      = help: it needs points at different places, not all of them on the axis
+    "#);
+    insta::assert_snapshot!(turned("Lines(points: [(1, 0), (2, 1), (-0.5, 2)])"), @r#"
+    error[scene::profile]: the curve of this point and those after it reaches the radius -5.000e-1, and must not cross the axis
+     --> scene.ron:2:58
+      |
+    2 | "it": (shape: Revolution(profile: Lines(points: [(1, 0), (2, 1), (-0.5, 2)])))})
+      |                                                          ^^^^^^ entities.it.shape.Revolution.profile.Lines.points.1
+      |
+      = help: the first number of a point is its distance from the axis: at least 0
+    "#);
+    insta::assert_snapshot!(turned("Spline(points: [(1, 0), (2, 1), (1, 2), (1, 3)], weights: [1, 0, 1, 1])"), @r#"
+    error[scene::out-of-range]: `weights` must be at least 1e-6 and at most 1000000, but is 0
+     --> scene.ron:2:97
+      |
+    2 | "it": (shape: Revolution(profile: Spline(points: [(1, 0), (2, 1), (1, 2), (1, 3)], weights: [1, 0, 1, 1])))})
+      |                                                                                                 ^ entities.it.shape.Revolution.profile.Spline.weights.1
+    "#);
+    insta::assert_snapshot!(turned("Spline(points: [(1, 0), (2, 1), (1, 2), (1, 3)], knots: [0, 1, 2, 3, 4, 5, 6, 5])"), @r#"
+    error[scene::profile]: knot 7 is less than the one before it
+     --> scene.ron:2:113
+      |
+    2 | "it": (shape: Revolution(profile: Spline(points: [(1, 0), (2, 1), (1, 2), (1, 3)], knots: [0, 1, 2, 3, 4, 5, 6, 5])))})
+      |                                                                                                                 ^ entities.it.shape.Revolution.profile.Spline.knots.7
+    "#);
+    insta::assert_snapshot!(turned("Bezier(points: [(1, 0), (2, 1), (1, inf), (1, 3)])"), @r#"
+    error[scene::not-finite]: `inf` is not a finite number
+     --> scene.ron:2:71
+      |
+    2 | "it": (shape: Revolution(profile: Bezier(points: [(1, 0), (2, 1), (1, inf), (1, 3)])))})
+      |                                                                       ^^^ entities.it.shape.Revolution.profile.Bezier.points.2.1
+    "#);
+    insta::assert_snapshot!(turned("\"vase\""), @r#"
+    error[scene::unknown-name]: there is no profile named `vase`
+     --> scene.ron:2:35
+      |
+    2 | "it": (shape: Revolution(profile: "vase"))})
+      |                                   ^^^^^^ entities.it.shape.Revolution.profile
+    "#);
+    insta::assert_snapshot!(mistakes(&with_entity("shape: Revolution(caped: true)")), @r#"
+    error[scene::unknown-field]: `Revolution` has no field `caped`
+     --> scene.ron:2:26
+      |
+    2 | "it": (shape: Revolution(caped: true))})
+      |                          ^^^^^ entities.it.shape.Revolution.caped
+      |
+      = help: did you mean `capped`?
+    "#);
+}
+
+/// A loop which crosses itself, repeated points and a touch of the axis are surfaces; a profile by its name is one for all.
+#[test]
+fn ugly_profiles_are_surfaces_and_names_share_them() {
+    let text = r#"(profiles: {
+            "loop": Bezier(points: [(0.2, 0), (2, 1), (-0.5, 1), (1, 0)]),
+            "cusp": Bezier(points: [(0.3, 0), (1.3, 1), (0.3, 1), (1.3, 0)]),
+            "stop": Bezier(points: [(1, 0), (1, 0), (1, 0), (0.5, 1)]),
+        },
+        entities: {
+            "camera": (camera: ()), "sky": (light: Sky(radiance: (1, 1, 1))),
+            "a": (shape: Revolution(profile: "loop")), "b": (shape: Revolution(profile: "loop", capped: true)),
+            "c": (shape: Revolution(profile: "cusp")), "d": (shape: Revolution(profile: "stop")),
+        })"#;
+    let scene = parse_scene_str("scene.ron", text, None, &LoadOptions::default());
+    let scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+    assert!(scene.warnings.0.is_empty(), "{}", scene.warnings.render(false));
+    let profile = |name: &str| match &scene.entities[name].shape {
+        Some(crate::description::Shape::Revolution { profile, capped }) => {
+            (profile.clone(), *capped)
+        }
+        other => panic!("{other:?}"),
+    };
+    let ((a, open), (b, capped)) = (profile("a"), profile("b"));
+    assert!(std::sync::Arc::ptr_eq(&a, &b) && !open && capped);
+    assert_eq!(a.open_ends[1], Some(glam::DVec2::new(1.0, 0.0)));
+}
