@@ -792,3 +792,39 @@ fn ugly_profiles_are_surfaces_and_names_share_them() {
     assert!(std::sync::Arc::ptr_eq(&a, &b) && !open && capped);
     assert_eq!(a.open_ends[1], Some(glam::DVec2::new(1.0, 0.0)));
 }
+
+#[test]
+fn wrong_textures_and_meshes_made_of_others_are_told() {
+    for (part, messages) in [
+        (
+            r#"textures: {"a": Mix(a: "b"), "b": Placed(of: "a")}"#,
+            &["the texture `b` is made of itself: `a` → `b` → `a`", "textures.b.Placed.of"][..],
+        ),
+        (
+            r#"textures: {"n": Noise(octaves: 99, size: -1), "r": Remap(of: "x", from: (1, 1))}"#,
+            &[
+                "`octaves` must be at least 1 and at most 32",
+                "textures.n.Noise.size",
+                "there is no texture named `x`",
+                "`from` must be two different numbers, but both are 1",
+            ][..],
+        ),
+        (
+            r#"meshes: {"s": Subdivided(of: "s", levels: 3)}"#,
+            &["the mesh `s` is made from itself", "meshes.s.Subdivided.of"][..],
+        ),
+        (
+            r#"meshes: {"g": Grid(size: (1, 1), cells: (2, 2)), "big": Subdivided(of: "g", levels: 40)}"#,
+            &["a mesh has at most 67108864 triangles", "meshes.big.Subdivided.levels"][..],
+        ),
+        (
+            r#"meshes: {"g": Grid(size: (1, 1), cells: (2, 2)), "d": Displaced(of: "g", height: "no")}"#,
+            &["there is no texture named `no`", "meshes.d.Displaced.height"][..],
+        ),
+    ] {
+        let told = mistakes(&with_part(part));
+        for message in messages {
+            assert!(told.contains(message), "{part}: {told}");
+        }
+    }
+}
