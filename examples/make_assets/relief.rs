@@ -1,22 +1,18 @@
 //! The relief of a wall of bricks, as heights and as normals.
 
-use crate::noise::{fbm, hash, smooth};
+use crate::textures::Wall;
 
 /// Side of the panel, metres.
 const SIDE: f64 = 0.6;
 /// Metres of a height of 1.
 const DEPTH: f64 = 0.02;
 
-/// Height in `[0, 1]` at `x`, `y` in metres: bricks of 150 × 75 mm with joints of 12 mm.
+/// Bricks of 150 × 75 mm with joints of 12 mm.
+const WALL: Wall = Wall { width: 0.15, height: 0.075, joint: 0.012, bevel: 0.014 };
+
+/// Height in `[0, 1]` at `x`, `y` in metres.
 fn height(x: f64, y: f64) -> f64 {
-    let (width, tall, joint, bevel, seed) = (0.15, 0.075, 0.012, 0.014, 3);
-    let row = (y / tall).floor();
-    let along = x / width + 0.5 * row.rem_euclid(2.0);
-    let column = along.floor();
-    let (fx, fy) = ((along - column) * width, y - row * tall);
-    let to_joint = fx.min(width - fx).min(fy).min(tall - fy) - joint / 2.0;
-    let id = hash(column as i64, row as i64, seed);
-    smooth(0.0, bevel, to_joint) * (0.8 + 0.2 * id) * (1.0 - 0.22 * fbm(40.0 * x, 40.0 * y, 4, 11))
+    WALL.at(x, y).0
 }
 
 /// The place of the centre of a texel, row 0 at the top.

@@ -14,7 +14,8 @@ fn stone(x: f64, y: f64) -> Color {
     // Joints are not ruled with a straightedge.
     let warped_x = x + 0.02 * (fbm(6.0 * x, 6.0 * y, 3, 5) - 0.5);
     let warped_y = y + 0.012 * (fbm(6.0 * x, 6.0 * y, 3, 6) - 0.5);
-    let (height, id) = brick(warped_x, warped_y);
+    let wall = Wall { width: 0.30, height: 0.10, joint: 0.012, bevel: 0.018 };
+    let (height, id) = wall.at(warped_x, warped_y);
     let grain = 0.7 + 0.6 * (fbm(9.0 * x, 9.0 * y, 5, 21) - 0.2);
     let block = [0.46 + 0.22 * id, 0.42 + 0.18 * id, 0.38 + 0.15 * id].map(|c| c * grain);
     let mortar = [0.20, 0.18, 0.16];
@@ -22,17 +23,28 @@ fn stone(x: f64, y: f64) -> Color {
     std::array::from_fn(|c| mix(mortar[c], block[c], cover))
 }
 
-/// Height in `[0, 1]` of a wall of bricks, 0 in the joints, and a number in `[0, 1)` for the brick.
-fn brick(x: f64, y: f64) -> (f64, f64) {
-    let (width, height, joint, bevel, seed) = (0.30, 0.10, 0.012, 0.018, 3);
-    let row = (y / height).floor();
-    let along = x / width + 0.5 * row.rem_euclid(2.0);
-    let column = along.floor();
-    let (fx, fy) = ((along - column) * width, y - row * height);
-    let to_joint = fx.min(width - fx).min(fy).min(height - fy) - joint / 2.0;
-    let id = hash(column as i64, row as i64, seed);
-    let rough = 1.0 - 0.22 * fbm(40.0 * x, 40.0 * y, 4, 11);
-    (smooth(0.0, bevel, to_joint) * (0.8 + 0.2 * id) * rough, id)
+/// A wall of bricks; all in metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Wall {
+    pub width: f64,
+    pub height: f64,
+    pub joint: f64,
+    pub bevel: f64,
+}
+
+impl Wall {
+    /// Height in `[0, 1]`, 0 in the joints, and a number in `[0, 1)` for the brick.
+    pub fn at(&self, x: f64, y: f64) -> (f64, f64) {
+        let Self { width, height, joint, bevel } = *self;
+        let row = (y / height).floor();
+        let along = x / width + 0.5 * row.rem_euclid(2.0);
+        let column = along.floor();
+        let (fx, fy) = ((along - column) * width, y - row * height);
+        let to_joint = fx.min(width - fx).min(fy).min(height - fy) - joint / 2.0;
+        let id = hash(column as i64, row as i64, 3);
+        let rough = 1.0 - 0.22 * fbm(40.0 * x, 40.0 * y, 4, 11);
+        (smooth(0.0, bevel, to_joint) * (0.8 + 0.2 * id) * rough, id)
+    }
 }
 
 /// Wood over the unit square: rings around a pith outside the board, and fine fibres along u.

@@ -97,6 +97,7 @@ fn moved(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::modelling::solids::{octahedron, volume};
     use crate::description::modelling::{Subdivision, grid, subdivided};
     use crate::description::{Texture, TextureFiltering, Value};
     use crate::shade::Pyramids;
@@ -130,21 +131,7 @@ mod tests {
     /// edge has two triangles by its places.
     #[test]
     fn an_even_height_makes_a_larger_sphere() {
-        let mut sphere = TriangleMesh {
-            positions: vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z],
-            triangles: vec![
-                [0, 1, 2],
-                [1, 3, 2],
-                [3, 4, 2],
-                [4, 0, 2],
-                [1, 0, 5],
-                [3, 1, 5],
-                [4, 3, 5],
-                [0, 4, 5],
-            ],
-            ..Default::default()
-        };
-        sphere = subdivided(&sphere, 5, Subdivision::Flat);
+        let mut sphere = subdivided(&octahedron(), 5, Subdivision::Flat);
         for p in &mut sphere.positions {
             *p = p.normalize();
         }
@@ -155,13 +142,6 @@ mod tests {
         let even = vec![Texture::Gradient { a: one, b: one }];
         let even = Textures::new(even, TextureFiltering::Point, &Pyramids::default());
         let raised = moved(&sphere, &even, 0, &by(0.25, 0.0));
-        let volume = |mesh: &TriangleMesh| -> f64 {
-            let signed = |t: &[u32; 3]| {
-                let [a, b, c] = t.map(|k| mesh.positions[k as usize].as_dvec3());
-                a.dot(b.cross(c)) / 6.0
-            };
-            mesh.triangles.iter().map(signed).sum()
-        };
         let ratio = volume(&raised) / volume(&sphere);
         assert!((ratio - 1.25_f64.powi(3)).abs() < 1e-4, "{ratio}");
         let uneven = moved(&sphere, &ramp(), 0, &by(0.25, 0.0));

@@ -7,3 +7,28 @@ mod weld;
 pub use grid::grid;
 pub use subdivide::{Subdivision, subdivided};
 pub use weld::{Weld, smooth_normals};
+
+/// What the tests of made meshes share.
+#[cfg(test)]
+pub(crate) mod solids {
+    use crate::description::TriangleMesh;
+    use glam::Vec3;
+
+    /// Corners at distance 1 on the axes.
+    pub(crate) fn octahedron() -> TriangleMesh {
+        let positions = vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
+        let upper = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2]];
+        let lower = [[1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]];
+        let triangles = upper.into_iter().chain(lower).collect();
+        TriangleMesh { positions, triangles, ..Default::default() }
+    }
+
+    /// The volume that a closed mesh encloses.
+    pub(crate) fn volume(mesh: &TriangleMesh) -> f64 {
+        let signed = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|k| mesh.positions[k as usize].as_dvec3());
+            a.dot(b.cross(c)) / 6.0
+        };
+        mesh.triangles.iter().map(signed).sum()
+    }
+}

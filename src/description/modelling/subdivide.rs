@@ -158,30 +158,8 @@ fn push_middle<T: Copy + std::ops::Add<Output = T>>(
 mod tests {
     use super::*;
     use crate::description::modelling::grid;
+    use crate::description::modelling::solids::{octahedron, volume};
     use glam::DVec2;
-
-    fn octahedron() -> TriangleMesh {
-        let positions = vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
-        let triangles = vec![
-            [0, 1, 2],
-            [1, 3, 2],
-            [3, 4, 2],
-            [4, 0, 2],
-            [1, 0, 5],
-            [3, 1, 5],
-            [4, 3, 5],
-            [0, 4, 5],
-        ];
-        TriangleMesh { positions, triangles, ..Default::default() }
-    }
-
-    fn volume(mesh: &TriangleMesh) -> f64 {
-        let signed = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(|k| mesh.positions[k as usize].as_dvec3());
-            a.dot(b.cross(c)) / 6.0
-        };
-        mesh.triangles.iter().map(signed).sum()
-    }
 
     /// Closed forms: a vertex of four neighbours keeps 5/8 of itself in one step (β = 3/32 for each of them); in the limit
     /// each of them counts 1/(3/(8β) + 4) = 1/8, so that the vertex of the octahedron ends at half its height (Loop
