@@ -136,8 +136,17 @@ mod tests {
             *p = p.normalize();
         }
         sphere.normals.clone_from(&sphere.positions);
-        // Different uv on both sides of a seam: the texture says different heights there.
+        // Every second triangle has vertices of its own, of which the texture says another height.
         sphere.uvs = sphere.positions.iter().map(|p| Vec2::splat(p.x)).collect();
+        for k in (0..sphere.triangles.len()).step_by(2) {
+            for corner in 0..3 {
+                let vertex = sphere.triangles[k][corner] as usize;
+                sphere.triangles[k][corner] = sphere.positions.len() as u32;
+                sphere.positions.push(sphere.positions[vertex]);
+                sphere.normals.push(sphere.normals[vertex]);
+                sphere.uvs.push(sphere.uvs[vertex] + 0.3);
+            }
+        }
         let one = Value::Constant(Vec3::ONE);
         let even = vec![Texture::Gradient { a: one, b: one }];
         let even = Textures::new(even, TextureFiltering::Point, &Pyramids::default());
