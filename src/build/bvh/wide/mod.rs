@@ -51,7 +51,9 @@ use node::{BLOCK, Block, Child, Node, WIDTH};
 use rayon::prelude::*;
 use traverse::{BlockHits, Lanes, Nodes, Portable, any_hit, closest_hit};
 
-/// Room on the stack that is enough for all but odd trees.
+/// Room on the stack that is enough for two levels of nodes, which lie in the cache with their blocks.
+const TINY_STACK: usize = 2 * (WIDTH - 1) + 1;
+/// Room that is enough for all but odd trees.
 const SHORT_STACK: usize = 96;
 /// Room that is enough for any tree: every level leaves all children but one on the stack.
 const LONG_STACK: usize = DEEPEST * (WIDTH - 1) + 1;
@@ -108,7 +110,11 @@ impl Instructions {
     /// These, or plain ones for rays and boxes of a size that they are not made for.
     #[inline]
     fn fit_for(self, ray: &LocalRay, reach: f32) -> Self {
-        if ray::can_be_fused(ray, reach) { self } else { Self::Portable }
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) if avx2.fits(ray, reach) => self,
+            _ => Self::Portable,
+        }
     }
 
     /// The nearest hit in a tree whose traversal takes `stack` places.
@@ -120,26 +126,38 @@ impl Instructions {
         ray: &LocalRay,
         t_max: f64,
     ) -> Option<TriangleHit> {
-        match (self.fit_for(ray, tree.reach()), stack <= SHORT_STACK) {
+        match (self.fit_for(ray, tree.reach()), stack) {
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), true) => avx2.closest_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=TINY_STACK) => {
+                avx2.closest_hit::<N, TINY_STACK>(tree, ray, t_max)
+            }
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), false) => avx2.closest_hit::<N, LONG_STACK>(tree, ray, t_max),
-            (Self::Portable, true) => closest_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
-            (Self::Portable, false) => closest_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=SHORT_STACK) => {
+                avx2.closest_hit::<N, SHORT_STACK>(tree, ray, t_max)
+            }
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), _) => avx2.closest_hit::<N, LONG_STACK>(tree, ray, t_max),
+            (Self::Portable, ..=SHORT_STACK) => {
+                closest_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max)
+            }
+            (Self::Portable, _) => closest_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
         }
     }
 
     /// Whether anything is hit in a tree whose traversal takes `stack` places.
     #[inline]
     fn any_hit<N: Nodes>(self, tree: &N, stack: usize, ray: &LocalRay, t_max: f64) -> bool {
-        match (self.fit_for(ray, tree.reach()), stack <= SHORT_STACK) {
+        match (self.fit_for(ray, tree.reach()), stack) {
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), true) => avx2.any_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=TINY_STACK) => avx2.any_hit::<N, TINY_STACK>(tree, ray, t_max),
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), false) => avx2.any_hit::<N, LONG_STACK>(tree, ray, t_max),
-            (Self::Portable, true) => any_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
-            (Self::Portable, false) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=SHORT_STACK) => avx2.any_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), _) => avx2.any_hit::<N, LONG_STACK>(tree, ray, t_max),
+            (Self::Portable, ..=SHORT_STACK) => {
+                any_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max)
+            }
+            (Self::Portable, _) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
         }
     }
 }
