@@ -11,8 +11,8 @@ use super::ray::{self, BoxRay, LEAST, ROUNDING, Scale, UNIT, larger, padded};
 use super::traverse::{
     BlockHits, Distances, Lanes, Nodes, TriangleHit, WideCorners, any_hit, closest_hit,
 };
-use crate::build::bvh::spheres::{LANES, SphereBlock};
 use crate::math::Aabb;
+use crate::math::instructions::has_avx2;
 use crate::shape::{LocalRay, TriangleTest};
 use std::arch::x86_64::{
     __m128, __m256, __m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ, _MM_HINT_T0,
@@ -24,7 +24,6 @@ use std::arch::x86_64::{
     _mm256_movemask_ps, _mm256_mul_pd, _mm256_or_pd, _mm256_set1_pd, _mm256_set1_ps,
     _mm256_setzero_pd, _mm256_setzero_ps, _mm256_store_pd, _mm256_store_ps, _mm256_sub_pd,
 };
-use std::sync::LazyLock;
 
 /// The proof that this processor has the instructions.
 #[derive(Clone, Copy, Debug)]
@@ -35,14 +34,7 @@ impl Avx2 {
     /// `None` where the processor lacks them.
     #[inline]
     pub(super) fn detect() -> Option<Self> {
-        // One flag for all of them: every ray asks.
-        static PRESENT: LazyLock<bool> = LazyLock::new(|| {
-            is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma")
-                && is_x86_feature_detected!("bmi1")
-                && is_x86_feature_detected!("popcnt")
-        });
-        PRESENT.then_some(Self(()))
+        has_avx2().then_some(Self(()))
     }
 
     /// Whether ray and boxes, whose coordinates are within `reach` of 0, are of a size for [`BoxLanes`].
@@ -86,23 +78,6 @@ impl Avx2 {
         // SAFETY: a value of this type exists only where the features were detected.
         unsafe { visit_boxes_avx2::<STACK>(tree, ray, t_max, visit) }
     }
-
-    /// [`SphereBlock::hits`].
-    #[inline]
-    pub(super) fn sphere_hits(
-        self,
-        block: &SphereBlock,
-        ray: &LocalRay,
-        t_max: f64,
-    ) -> [f64; LANES] {
-        // SAFETY: a value of this type exists only where the features were detected.
-        unsafe { sphere_hits_avx2(block, ray, t_max) }
-    }
-}
-
-#[target_feature(enable = "avx2,bmi1,popcnt")]
-fn sphere_hits_avx2(block: &SphereBlock, ray: &LocalRay, t_max: f64) -> [f64; LANES] {
-    block.hits(ray, t_max)
 }
 
 #[target_feature(enable = "avx2,fma,bmi1,popcnt")]

@@ -41,7 +41,6 @@ pub use moving::MovingTree;
 pub(super) use moving::segment_of;
 pub use traverse::TriangleHit;
 
-use super::spheres::{LANES, SphereBlock};
 use crate::description::{BvhQuality, TriangleMesh};
 use crate::math::Aabb;
 use crate::shape::LocalRay;
@@ -159,17 +158,6 @@ impl Instructions {
             }
             (Self::Portable, _) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
         }
-    }
-}
-
-/// Where a ray in render space meets the spheres of a block with `0 < t < t_max`; infinity where it does
-/// not.
-#[inline]
-pub(super) fn sphere_hits(block: &SphereBlock, ray: &LocalRay, t_max: f64) -> [f64; LANES] {
-    match Instructions::detect() {
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(avx2) => avx2.sphere_hits(block, ray, t_max),
-        Instructions::Portable => block.hits(ray, t_max),
     }
 }
 
