@@ -4,7 +4,10 @@ use crate::build::bvh::{MeshTrees, RestingTree, TopLevel};
 use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
-use crate::extract::{ChosenIntegrator, Emissions, Instance, Instances, Surfaces, ViewCamera};
+use crate::extract::{
+    ChosenIntegrator, DicingRefused, Emissions, Instance, Instances, Surfaces, ViewCamera,
+    meshes_fit,
+};
 use crate::film::{Film, FilmError};
 use crate::integrate::{IntegrateStatus, PhotonReport};
 use crate::shade::nesting::NestingFaults;
@@ -115,6 +118,22 @@ pub enum RenderError {
         megabytes: usize,
         /// What the system answered.
         source: TryReserveError,
+    },
+    /// A mesh that is divided for the camera would take too much memory.
+    #[error(
+        "dicing the mesh `{mesh}` takes at least {triangles} triangles, {megabytes} MB, and \
+         `dicing_memory` is {limit} MiB: set a larger `dicing`, displace a smaller mesh, keep it farther from the \
+         camera, or allow more"
+    )]
+    Dicing {
+        /// Its name.
+        mesh: String,
+        /// Triangles that it would have at least.
+        triangles: usize,
+        /// What they would take.
+        megabytes: usize,
+        /// What is allowed.
+        limit: u32,
     },
     /// The shutter closes before it opens, or the rate is not positive.
     #[error("the clock cannot run: {0}")]
@@ -266,6 +285,14 @@ impl Simulation {
         if let Some(first) = self.dangling() {
             self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::Dangling(first));
+        }
+        if let Some(refusal) = self.world.resource::<DicingRefused>().0.clone() {
+            let name = self.world.get::<Name>(refusal.mesh);
+            let mesh = name.map_or_else(String::new, |name| name.as_str().to_owned());
+            let (triangles, megabytes) = (refusal.triangles, refusal.bytes / 1_000_000);
+            let limit = self.world.resource::<Settings>().0.dicing_memory;
+            self.world.resource_mut::<Instances>().mark_unseen();
+            return Err(RenderError::Dicing { mesh, triangles, megabytes, limit });
         }
         let memory = self.world.resource::<TreeMemory>();
         if let Some(source) = memory.refused.clone() {
@@ -456,8 +483,8 @@ fn frame_schedule(world: &mut World) -> Schedule {
     frame.configure_sets((Marks::Opening, Step, Marks::Stepped, Extract).chain());
     frame.configure_sets((Extract, Marks::Extracted, Build, Marks::Built).chain());
     frame.configure_sets((Marks::Built, Integrate, Marks::Integrated).chain());
-    frame.configure_sets(Build.run_if(nothing_dangles));
-    frame.configure_sets(Integrate.run_if(nothing_dangles).run_if(trees_fit));
+    frame.configure_sets(Build.run_if(nothing_dangles).run_if(meshes_fit));
+    frame.configure_sets(Integrate.run_if(nothing_dangles).run_if(meshes_fit).run_if(trees_fit));
     for set in [Marks::Opening, Marks::Stepped, Marks::Extracted, Marks::Built, Marks::Integrated] {
         frame.add_systems(mark.in_set(set));
     }

@@ -27,7 +27,7 @@ pub use motion::{
 pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use profile::{Curve, CurveError};
 pub use read::{LoadOptions, load_scene, parse_scene_str};
-pub use scene::{Displacement, EntityDescription, SceneDescription};
+pub use scene::{Displacement, EntityDescription, Relief, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{

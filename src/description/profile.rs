@@ -161,7 +161,7 @@ fn closed_spline(
 }
 
 /// A curve of degree 3 is whole with at most 3 equal knots inside and 4 at either end.
-fn check_knots(knots: &[f64], points: usize) -> Result<(), CurveError> {
+pub(super) fn check_knots(knots: &[f64], points: usize) -> Result<(), CurveError> {
     let found = knots.len();
     if found != points + 4 {
         return Err(CurveError::Length { list: "knots", expected: points + 4, points, found });

@@ -8,15 +8,31 @@ use indexmap::IndexMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// How a mesh is moved along its normals by a texture. `R` refers to a texture.
+/// How a mesh is moved by a texture. `R` refers to a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Displacement<R> {
-    /// The texture whose number is the height.
-    pub height: R,
-    /// Metres of a height of 1.
+    /// The texture.
+    pub texture: R,
+    /// What it says.
+    pub says: Relief,
+    /// Metres of a height or a coordinate of 1.
     pub strength: f32,
-    /// The height which stays where it is.
+    /// The height or the coordinate which stays where it is.
     pub middle: f32,
+    /// Whether the mesh is divided first, to edges of [`RenderSettings::dicing`] pixels.
+    pub adaptive: bool,
+}
+
+/// What a texture says that displaces a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Relief {
+    /// A height along the normal: its number.
+    Height,
+    /// A vector along the tangent in the direction of u, the tangent across it in the direction of v, and the
+    /// normal: its colour.
+    Tangent,
+    /// A vector in the space of the mesh: its colour.
+    Object,
 }
 
 /// A scene: everything that `load_scene` found, checked, with every named file read.

@@ -67,6 +67,11 @@ pub struct RenderSettings {
     /// How much work goes into the trees of meshes. Trades time and memory before the first ray for
     /// the time of every ray; the picture is the same.
     pub bvh: BvhQuality,
+    /// The longest edge of a displaced mesh that is divided adaptively, in pixels. Trades the form of the relief for
+    /// time and memory.
+    pub dicing: f64,
+    /// Mebibytes that such a mesh may take, without its tree; one that would take more is an error.
+    pub dicing_memory: u32,
     /// What is done about textures which are finer than what a sample stands for. Trades sharpness at a slant and
     /// time for noise.
     pub texture_filter: TextureFiltering,
@@ -98,6 +103,8 @@ impl Default for RenderSettings {
             clamp_indirect: None,
             motion_tolerance: 0.001,
             bvh: BvhQuality::default(),
+            dicing: 1.0,
+            dicing_memory: 1024,
             texture_filter: TextureFiltering::default(),
             exposure: 0.0,
             tonemap: ToneMap::Srgb,

@@ -19,7 +19,8 @@ mod solids;
 mod surfaces;
 
 pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
-pub use displace::{Displaced, displace_meshes};
+pub(crate) use displace::meshes_fit;
+pub use displace::{DicingRefused, Displaced, Refusal, displace_meshes};
 pub use emissions::{Emissions, SurfaceEmission, extract_emissions};
 pub use instance::{Geometry, Instance, NOTHING};
 pub use instances::{Instances, Meshes, extract_instances, extract_meshes};
@@ -38,6 +39,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(FrameOrigin::default());
     world.insert_resource(ViewCamera::default());
     world.insert_resource(Meshes::default());
+    world.insert_resource(DicingRefused::default());
     world.insert_resource(Instances::default());
     world.insert_resource(RestingMeshes::default());
     world.insert_resource(Surfaces::default());

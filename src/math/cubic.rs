@@ -8,6 +8,7 @@
 //! Design* 6, section 4).
 
 use glam::{DVec2, DVec3};
+use std::ops::{Add, Mul};
 
 /// A rational cubic Bézier curve: its control points times their weights, and the weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,27 +61,42 @@ impl Cubic {
 
 /// A cubic B-spline with control points `points`, their weights, and `points + 4` knots which do not
 /// decrease, as one curve for each interval of knots which is not empty.
-///
-/// The control points of an interval are blossoms, evaluated by de Boor's algorithm, each step of which takes
-/// one of their arguments.
 pub fn spline(points: &[DVec2], weights: &[f64], knots: &[f64]) -> Vec<Cubic> {
     let homogeneous: Vec<DVec3> =
         points.iter().zip(weights).map(|(p, w)| (*p * *w).extend(*w)).collect();
-    let mut curves = Vec::new();
+    bezier_of_spline(&homogeneous, knots).into_iter().map(Cubic).collect()
+}
+
+/// What control points are made of: vectors.
+pub trait Control: Copy + Add<Output = Self> + Mul<f64, Output = Self> {}
+
+impl<V: Copy + Add<Output = Self> + Mul<f64, Output = Self>> Control for V {}
+
+/// A cubic B-spline of any vectors, with as many knots and 4 more which do not decrease: the control points of one
+/// Bézier curve for each interval of knots which is not empty.
+///
+/// They are blossoms, evaluated by de Boor's algorithm, each step of which takes one of their arguments.
+pub fn bezier_of_spline<V: Control>(points: &[V], knots: &[f64]) -> Vec<[V; 4]> {
+    let mut curves: Vec<[V; 4]> = Vec::new();
     for i in 3..points.len() {
         let (a, b) = (knots[i], knots[i + 1]);
         if a < b {
             let around: [f64; 6] = std::array::from_fn(|k| knots[i - 2 + k]);
-            let control: [DVec3; 4] = std::array::from_fn(|k| homogeneous[i - 3 + k]);
+            let control: [V; 4] = std::array::from_fn(|k| points[i - 3 + k]);
             let args = [[a, a, a], [a, a, b], [a, b, b], [b, b, b]];
-            curves.push(Cubic(args.map(|args| de_boor(control, around, args))));
+            let mut curve = args.map(|args| de_boor(control, around, args));
+            // The bits of where the one before ends, which are rounded otherwise.
+            if let Some([.., end]) = curves.last() {
+                curve[0] = *end;
+            }
+            curves.push(curve);
         }
     }
     curves
 }
 
 /// The blossom of an interval of a B-spline: its four control points and the three knots to either side.
-fn de_boor(mut row: [DVec3; 4], knots: [f64; 6], args: [f64; 3]) -> DVec3 {
+fn de_boor<V: Control>(mut row: [V; 4], knots: [f64; 6], args: [f64; 3]) -> V {
     for (step, t) in args.into_iter().enumerate() {
         for k in 0..3 - step {
             let (from, to) = (knots[k + step], knots[k + 3]);

@@ -14,7 +14,7 @@ mod swept;
 
 pub use bounds::Aabb;
 pub use cone::Cone;
-pub use cubic::{Cubic, clamped_knots, spline};
+pub use cubic::{Control, Cubic, bezier_of_spline, clamped_knots, spline};
 pub use frame::Frame;
 pub use motion::{Decomposed, MotionTransform};
 pub(crate) use profile::bracketed_root;

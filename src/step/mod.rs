@@ -11,12 +11,14 @@ mod hierarchy;
 mod pose;
 mod shutter;
 mod track;
+mod views;
 mod waves;
 
 pub use deform::deform_meshes;
 pub use hierarchy::propagate_poses;
 pub use pose::{PoseInput, evaluate_optics_at, local_pose, pose_moving_entities};
 pub use shutter::sample_shutter;
+pub use views::survey_views;
 
 use bevy_ecs::prelude::*;
 use bevy_ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel, SingleThreadedExecutor};
@@ -56,6 +58,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         propagate_poses.in_set(PoseSystems::Propagate),
     ));
     world.add_schedule(poses);
-    let systems = (sample_shutter, stamp("poses"), deform_meshes, stamp("deformation"));
+    let systems =
+        (survey_views, sample_shutter, stamp("poses"), deform_meshes, stamp("deformation"));
     frame.add_systems(systems.chain().in_set(FrameSystems::Step));
 }

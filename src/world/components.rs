@@ -4,7 +4,8 @@
 //! file has a name. Textures, materials and meshes are entities too: an object made of a material
 //! of its own carries a [`Material`]; one that shares it points there with [`MadeOf`].
 
-use crate::description::{self, ImageData, TriangleMesh};
+use crate::description::modelling::View;
+use crate::description::{self, Clock, ImageData, TriangleMesh};
 use crate::math::Aabb;
 use bevy_ecs::component::{Mutable, RequiredComponentsRegistrator, StorageType};
 use bevy_ecs::prelude::*;
@@ -23,7 +24,7 @@ pub type Texture = description::Texture<Arc<ImageData>, Entity>;
 pub type Shape = description::Shape<Entity>;
 /// Light which leaves the surface of a shape.
 pub type Emission = description::Emission<Entity>;
-/// How a mesh is moved along its normals by a texture; it stands beside the [`Mesh`].
+/// How a mesh is moved by a texture; it stands beside the [`Mesh`].
 pub type Displacement = description::Displacement<Entity>;
 /// A light without a shape.
 pub type Light = description::Light<Entity>;
@@ -124,6 +125,18 @@ impl Mesh {
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
+}
+
+/// From where the camera sees the instances of a mesh over all frames of the clock; only beside an adaptive
+/// [`Displacement`]. Written by the step stage.
+#[derive(Component, Clone, Debug, PartialEq)]
+pub struct Views {
+    /// All views.
+    pub list: Vec<View>,
+    /// The clock of which these are the frames.
+    pub clock: Clock,
+    /// The size of the picture in pixels.
+    pub size: (u32, u32),
 }
 
 /// Points from an object to the entity which holds its [`Material`].

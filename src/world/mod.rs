@@ -8,7 +8,7 @@ mod spawn;
 pub use components::{
     Acceleration, ActiveCamera, Camera, ChildOf, Children, Displacement, Emission, EmissionFactor,
     HiddenFromCamera, Keyframes, Light, LocalPose, LookAt, MadeOf, Material, Mesh, Name, Optics,
-    Shape, ShutterMotion, Texture, Transform, Velocity, WorldTransform,
+    Shape, ShutterMotion, Texture, Transform, Velocity, Views, WorldTransform,
 };
 pub(crate) use deformation::ShutterSpan;
 pub use deformation::{Deformation, VertexMotion, Vertices};

@@ -52,9 +52,10 @@ pub fn spawn_scene(world: &mut World, scene: &SceneDescription) -> SceneEntities
     for (name, mesh) in &scene.meshes {
         world.entity_mut(spawned.meshes[name]).insert(Mesh::new(mesh.clone()));
     }
-    for (name, Displacement { height, strength, middle }) in &scene.displacements {
-        let height = entity(&spawned.textures, height);
-        let displacement = super::Displacement { height, strength: *strength, middle: *middle };
+    for (name, displacement) in &scene.displacements {
+        let Displacement { ref texture, says, strength, middle, adaptive } = *displacement;
+        let texture = entity(&spawned.textures, texture);
+        let displacement = super::Displacement { texture, says, strength, middle, adaptive };
         world.entity_mut(spawned.meshes[name]).insert(displacement);
     }
     for (name, waves) in &scene.waves {

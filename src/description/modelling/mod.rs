@@ -1,10 +1,14 @@
 //! Meshes made from other meshes and from numbers.
 
+mod dice;
 mod grid;
+mod patches;
 mod subdivide;
 mod weld;
 
+pub use dice::{TooFine, View, divided_where_long, longest_span, perspective_pixel};
 pub use grid::grid;
+pub use patches::{Patch, Placed, Run, cells_for, patch_mesh, spline_patches};
 pub use subdivide::{Subdivision, subdivided};
 pub use weld::{Weld, smooth_normals};
 

@@ -5,6 +5,7 @@ use super::files;
 use super::limits;
 use super::outline::Kind;
 use super::overrides::FIELDS;
+use super::patches::{bezier_mesh, spline_mesh};
 use super::profile::read_profile;
 use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
@@ -287,6 +288,8 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
         ("clamp_indirect", f64::from(render.clamp_indirect.unwrap_or(1.0)), &limits::POSITIVE),
         ("final_gather", f64::from(render.final_gather), &limits::GATHER),
         ("motion_tolerance", render.motion_tolerance, &limits::TOLERANCE),
+        ("dicing", render.dicing, &limits::POSITIVE),
+        ("dicing_memory", f64::from(render.dicing_memory), &limits::MEBIBYTES),
         ("exposure", f64::from(render.exposure), &limits::STOPS),
     ];
     for (name, value, limits) in numbers {
@@ -479,8 +482,9 @@ impl Assets<'_> {
                 surface::check_levels(cursor, &mesh, levels, report)?;
                 Some(Arc::new(subdivided(&mesh, levels, form)))
             }
-            MeshFile::Displaced { of, height, strength, middle } => {
-                let displacement = Displacement { height, strength, middle };
+            MeshFile::Displaced { of, height, offset, space, strength, middle, adaptive } => {
+                let (says, texture) = surface::relief(cursor, height, offset, space, report)?;
+                let displacement = Displacement { texture, says, strength, middle, adaptive };
                 surface::check_displacement(cursor, &displacement, names, report);
                 let mesh = self.part(cursor, &of, names, made, scene, report)?;
                 scene.displacements.insert(name.to_owned(), displacement);
@@ -491,6 +495,14 @@ impl Assets<'_> {
                     cursor, positions, &triangles, normals, uvs, colors, report,
                 )
                 .map(Arc::new)
+            }
+            MeshFile::Patches { points, weights, patches, tolerance } => {
+                let net = (&points[..], weights);
+                bezier_mesh(cursor, net, &patches, tolerance, report).map(Arc::new)
+            }
+            MeshFile::Spline { rows, weights, knots_u, knots_v, closed, tolerance } => {
+                let (net, knots) = ((&rows[..], &weights[..]), (knots_u, knots_v));
+                spline_mesh(cursor, net, knots, closed, tolerance, report).map(Arc::new)
             }
             MeshFile::Waves { size, cells, waves, steepness, gravity } => {
                 let waves = Waves { size, cells, steepness, gravity, waves };

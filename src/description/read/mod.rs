@@ -17,6 +17,7 @@ mod limits;
 mod motion;
 mod outline;
 mod overrides;
+mod patches;
 mod profile;
 mod relations;
 mod source;

@@ -270,7 +270,7 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
             Some(Shape::Mesh(name)) => {
                 let mut of = Some(name.clone());
                 while let Some(name) = of {
-                    let height = scene.displacements.get(&name).map(|by| by.height.clone());
+                    let height = scene.displacements.get(&name).map(|by| by.texture.clone());
                     used.extend(height.map(|height| ("texture", height)));
                     let part = names.meshes.get(&name).and_then(|mesh| mesh.field("of"));
                     of = part.map(|part| super::outline::unquoted(part.text()));

@@ -9,10 +9,10 @@ use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
 use crate::description::modelling::Subdivision;
 use crate::description::{
-    Displacement, Emission, EmissionStrength, Light, Material, Rgb, Shape, Texture, TriangleMesh,
-    Value, Wave,
+    Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb, Shape, Texture,
+    TriangleMesh, Value, Wave,
 };
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
 use serde::Deserialize;
 
@@ -42,14 +42,42 @@ pub(super) enum MeshFile {
         #[serde(default)]
         form: Subdivision,
     },
-    /// One that is moved along its normals by a texture.
+    /// One that is moved by a texture.
     Displaced {
         of: String,
-        height: String,
+        #[serde(default)]
+        height: Option<String>,
+        #[serde(default)]
+        offset: Option<String>,
+        #[serde(default)]
+        space: OffsetSpace,
         #[serde(default = "centimetre")]
         strength: f32,
         #[serde(default)]
         middle: f32,
+        #[serde(default)]
+        adaptive: bool,
+    },
+    /// Bicubic Bézier patches.
+    Patches {
+        points: Vec<DVec3>,
+        #[serde(default)]
+        weights: Vec<f64>,
+        patches: Vec<Vec<u32>>,
+        tolerance: f64,
+    },
+    /// A bicubic B-spline surface, with weights NURBS.
+    Spline {
+        rows: Vec<Vec<DVec3>>,
+        #[serde(default)]
+        weights: Vec<Vec<f64>>,
+        #[serde(default)]
+        knots_u: Vec<f64>,
+        #[serde(default)]
+        knots_v: Vec<f64>,
+        #[serde(default)]
+        closed: (bool, bool),
+        tolerance: f64,
     },
     /// The moving surface of water.
     Waves {
@@ -61,6 +89,16 @@ pub(super) enum MeshFile {
         #[serde(default = "earth")]
         gravity: f64,
     },
+}
+
+/// Along what the coordinates of an offset are.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+pub(super) enum OffsetSpace {
+    /// u, v and the normal.
+    #[default]
+    Tangent,
+    /// x, y and z of the mesh.
+    Object,
 }
 
 /// The usual strength of a displacement, metres.
@@ -413,7 +451,7 @@ pub(super) fn check_levels(
     check_triangle_count(&place, count, report).then_some(())
 }
 
-fn check_triangle_count(place: &Cursor, count: f64, report: &mut Report) -> bool {
+pub(super) fn check_triangle_count(place: &Cursor, count: f64, report: &mut Report) -> bool {
     let fine = count <= MAX_MESH_ELEMENTS as f64;
     if !fine {
         let message = format!(
@@ -424,6 +462,31 @@ fn check_triangle_count(place: &Cursor, count: f64, report: &mut Report) -> bool
     fine
 }
 
+/// What a displacement says, and by which texture.
+pub(super) fn relief(
+    cursor: &Cursor,
+    height: Option<String>,
+    offset: Option<String>,
+    space: OffsetSpace,
+    report: &mut Report,
+) -> Option<(Relief, String)> {
+    match (height, offset, space) {
+        (Some(texture), None, _) => Some((Relief::Height, texture)),
+        (None, Some(texture), OffsetSpace::Tangent) => Some((Relief::Tangent, texture)),
+        (None, Some(texture), OffsetSpace::Object) => Some((Relief::Object, texture)),
+        (None, None, _) => {
+            let message = "nothing displaces this: give it a `height` or an `offset`, a texture";
+            report.at("scene::missing", cursor, message);
+            None
+        }
+        (Some(_), Some(_), _) => {
+            let message = "`height` and `offset` exclude each other: displace by one of them";
+            report.at("scene::conflict", &cursor.at("offset"), message);
+            None
+        }
+    }
+}
+
 /// Checks a displacement.
 pub(super) fn check_displacement(
     cursor: &Cursor,
@@ -432,7 +495,8 @@ pub(super) fn check_displacement(
     report: &mut Report,
 ) {
     let mut check = Parameters { cursor, names, report };
-    check.texture(&cursor.at("height"), &displacement.height);
+    let field = if displacement.says == Relief::Height { "height" } else { "offset" };
+    check.texture(&cursor.at(field), &displacement.texture);
     check.number("strength", displacement.strength, &limits::COORDINATE);
     check.number("middle", displacement.middle, &limits::COORDINATE);
 }
