@@ -191,6 +191,106 @@ fn a_normal_map_holds_the_normal() {
     }
 }
 
+/// Closed form: a normal map on a mesh of two halves on which u grows outwards holds normals that are mirrored; so does the
+/// mesh when its object is turned over, and the map is stretched as the mesh is.
+#[test]
+fn a_normal_map_on_a_mesh_follows_its_uv() {
+    let n = Vec3::new(0.36, -0.48, 0.8);
+    for (transform, stretched) in [
+        ("", n),
+        ("scale: 2", n),
+        ("scale: (-1, 1, 1)", n),
+        ("scale: (1, 1, 0.25)", Vec3::new(n.x, n.y, n.z / 0.25).normalize()),
+    ] {
+        let text = format!(
+            r#"(
+    render: (max_depth: 1, layers: [Beauty, Normal], filter: Box(radius: 0.5)),
+    textures: {{ "n": Gradient(a: (0.68, 0.26, 0.9), b: (0.68, 0.26, 0.9)) }},
+    materials: {{ "flat": Diffuse(), "relief": NormalMap(material: "flat", map: "n") }},
+    meshes: {{ "halves": Triangles(
+        positions: [(-1, -1, 0), (0, -1, 0), (1, -1, 0), (-1, 1, 0), (0, 1, 0), (1, 1, 0)],
+        uvs: [(1, 0), (0, 0), (1, 0), (1, 1), (0, 1), (1, 1)],
+        triangles: [(0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4)]) }},
+    entities: {{
+        "camera": (transform: (translation: (0, 0, 5)), camera: (orthographic: 2)),
+        "halves": (transform: ({transform}), shape: Mesh("halves"), material: "relief"),
+        "sky": (light: Sky(radiance: 1)),
+    }},
+)"#
+        );
+        let picture = render(&text, (8, 8), 4);
+        let planes = picture.film.image(kinora::description::Layer::Normal).expect("asked for");
+        for pixel in 0..64 {
+            let component = |k: usize| match &planes[k].samples {
+                kinora::film::PlaneSamples::F32(values) => values[pixel],
+                kinora::film::PlaneSamples::U32(_) => panic!("normals are numbers"),
+            };
+            let found = Vec3::new(component(0), component(1), component(2));
+            let outwards = if pixel % 8 < 4 { -1.0 } else { 1.0 };
+            let expected = stretched * Vec3::new(outwards, 1.0, 1.0);
+            assert!((found - expected).length() < 1e-5, "{transform} {pixel}: {found} {expected}");
+        }
+    }
+}
+
+/// Oracle: the sphere itself, seen from afar under a lamp as far away, by the same samples. A square with its normals
+/// is as bright at every pixel; up to half a right angle from the camera, beyond which normals are bent.
+///
+/// The map's normal is a mean over a kernel no wider than two pixels of side h to either side, whose variance per axis
+/// is at most that of a box, (4h)²/12; the mean of a function f is off by its half times ∇²f. For
+/// √(1 − r²), r² < ½, ∇² is at most 3·√2, and n·l has `z` with a factor below 1.
+#[test]
+fn the_normal_map_of_a_sphere_lights_a_square_as_the_sphere_is_lit() {
+    let size = 1024_u32;
+    let pixels = (0..size * size).map(|k| {
+        let at = |k: u32| (f64::from(k) + 0.5) / f64::from(size) * 2.0 - 1.0;
+        // The first row of an image is on top.
+        let (x, y) = (at(k % size), -at(k / size));
+        let n = DVec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt()).normalize();
+        (n * 0.5 + 0.5).as_vec3().extend(1.0).to_array()
+    });
+    let file =
+        ImageData { width: size, height: size, pixels: ImagePixels::Rgba32F(pixels.collect()) };
+    let mut normals = image(file);
+    if let Texture::Image { repeat, .. } = &mut normals {
+        *repeat = glam::Vec2::ONE;
+    }
+    let side = 48;
+    let lit = |shape: &str| {
+        let text = format!(
+            r#"(
+    render: (max_depth: 1, filter: Box(radius: 0.5)),
+    textures: {{ "normals": Checker() }},
+    materials: {{ "plain": Diffuse(albedo: 1), "mapped": NormalMap(material: "plain", map: "normals") }},
+    entities: {{
+        "camera": (transform: (translation: (0, 0, 5)), camera: (orthographic: 2)),
+        "thing": ({shape}),
+        "sun": (transform: (rotation: (-20, 35, 0)), light: Directional(irradiance: (3.1415927, 3.1415927, 3.1415927))),
+    }},
+)"#
+        );
+        let mut description = scene(&text);
+        description.textures.insert("normals".to_owned(), normals.clone());
+        (description.render.size, description.render.samples) = ((side, side), 16);
+        render_description(&description, 0)
+    };
+    let sphere = lit(r#"shape: Sphere(), material: "plain""#);
+    let square = lit(r#"shape: Rectangle(size: (2, 2)), material: "mapped""#);
+    let h = 2.0 / f64::from(side);
+    let bound = 0.5 * (4.0 * h).powi(2) / 12.0 * 3.0 * std::f64::consts::SQRT_2;
+    let mut seen = 0;
+    for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+        let at = |k: u32| (f64::from(k) + 0.5) * h - 1.0;
+        // With the half of its diagonal all of the pixel lies within the limit.
+        if at(x).hypot(at(y)) + h < std::f64::consts::FRAC_1_SQRT_2 {
+            let (a, b) = (f64::from(sphere.at(x, y).y), f64::from(square.at(x, y).y));
+            assert!((a - b).abs() < bound, "{x} {y}: {a} {b}, bound {bound}");
+            seen += 1;
+        }
+    }
+    assert!(seen > 600, "{seen}");
+}
+
 /// Oracle: the height's own derivative: a bump map and the normal map made from the same sine light a wall alike, and
 /// both as the cosine of the normal says.
 #[test]

@@ -91,6 +91,8 @@ fn moved(
         *p = (p.as_dvec3() + normal.normalize_or_zero() * by).as_vec3();
     }
     moved.normals = smooth_normals(&moved, &weld);
+    // Those given belong to the surface at rest.
+    moved.tangents = Vec::new();
     moved
 }
 

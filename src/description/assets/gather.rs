@@ -3,7 +3,7 @@
 use super::MAX_MESH_ELEMENTS;
 use super::accessor::Source;
 use crate::description::{Rgb, TriangleMesh};
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use gltf::json::Index;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
@@ -14,6 +14,7 @@ pub(super) struct Gathered {
     mesh: TriangleMesh,
     any_uv: bool,
     any_normal: bool,
+    any_tangent: bool,
     any_color: bool,
 }
 
@@ -38,6 +39,9 @@ impl Gathered {
         let normals = optional::<3>(source, attribute(Semantic::Normals), count, "normals")?;
         let uvs =
             optional::<2>(source, attribute(Semantic::TexCoords(0)), count, "texture coordinates")?;
+        // Without normals they must be ignored (specification, section 3.7.2.1).
+        let tangents = attribute(Semantic::Tangents).filter(|_| normals.is_some());
+        let tangents = optional::<4>(source, tangents, count, "tangents")?;
         let colors = match attribute(Semantic::Colors(0)) {
             Some(colors) => Some(source.colors(colors)?).filter(|colors| colors.len() == count),
             None => None,
@@ -59,6 +63,7 @@ impl Gathered {
         }
         self.any_uv |= uvs.is_some();
         self.any_normal |= normals.is_some();
+        self.any_tangent |= tangents.is_some();
         self.any_color |= colors.is_some();
         let place =
             |p: &[f32; 3]| transform.transform_point3(DVec3::from(p.map(f64::from))).as_vec3();
@@ -69,8 +74,18 @@ impl Gathered {
         extend(&mut self.mesh.normals, normals, count, orient, Vec3::ZERO);
         // glTF counts v downwards.
         extend(&mut self.mesh.uvs, uvs, count, |[u, v]| Vec2::new(u, 1.0 - v), Vec2::ZERO);
-        extend(&mut self.mesh.colors, colors, count, Rgb::from_array, Rgb::ONE);
         let mirrored = transform.matrix3.determinant() < 0.0;
+        let along = |[x, y, z, sign]: [f32; 4]| {
+            let tangent = transform.transform_vector3(DVec3::new(x.into(), y.into(), z.into()));
+            // A mirror turns the hand of the three axes.
+            let sign = if (sign < 0.0) == mirrored { 1.0 } else { -1.0 };
+            match tangent.try_normalize() {
+                Some(tangent) if tangent.is_finite() => tangent.as_vec3().extend(sign),
+                _ => Vec4::ZERO,
+            }
+        };
+        extend(&mut self.mesh.tangents, tangents, count, along, Vec4::ZERO);
+        extend(&mut self.mesh.colors, colors, count, Rgb::from_array, Rgb::ONE);
         let offset = first as u32;
         self.mesh.triangles.extend(assemble(&indices, mode).map(|[a, b, c]| {
             // A mirror turns fronts into backs; going round the other way turns them again.
@@ -86,6 +101,9 @@ impl Gathered {
         }
         if !self.any_normal {
             self.mesh.normals = Vec::new();
+        }
+        if !self.any_tangent {
+            self.mesh.tangents = Vec::new();
         }
         if !self.any_color {
             self.mesh.colors = Vec::new();

@@ -83,6 +83,7 @@ pub enum AssetError {
 /// * Vertex normals have unit length; one which is missing, zero or not finite in a mesh that has
 ///   normals is replaced by the normal of the face. A mesh without any normals stays without.
 /// * `v` grows upwards: glTF, where it grows downwards, is flipped.
+/// * Tangents are read from glTF; one of a vertex whose normal was replaced is left out.
 /// * Triangles of zero area are dropped, and vertices that no triangle uses.
 ///
 /// # Errors

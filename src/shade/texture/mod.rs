@@ -77,13 +77,19 @@ pub struct TextureNeeds {
     pub place: bool,
     /// How much of the surface a sample stands for.
     pub footprint: bool,
+    /// The directions that a normal map was made for.
+    pub tangents: bool,
 }
 
 impl TextureNeeds {
     /// What either needs.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
-        Self { place: self.place || other.place, footprint: self.footprint || other.footprint }
+        Self {
+            place: self.place || other.place,
+            footprint: self.footprint || other.footprint,
+            tangents: self.tangents || other.tangents,
+        }
     }
 }
 
@@ -163,7 +169,8 @@ impl Textures {
                 | Texture::Triplanar { .. }
                 | Texture::VertexColor {}
         );
-        let own = TextureNeeds { place, footprint: self.filtering != TextureFiltering::Point };
+        let footprint = self.filtering != TextureFiltering::Point;
+        let own = TextureNeeds { place, footprint, tangents: false };
         texture.refs().fold(own, |sum, (_, part)| sum.and(self.needs(*part)))
     }
 
