@@ -375,6 +375,35 @@ fn steep_bumps_neither_make_nor_swallow_light() {
     }
 }
 
+/// Closed form: an image that two textures name in two ways and many balls are painted with is in memory once, with
+/// smaller copies down to one texel.
+#[test]
+fn an_image_is_in_memory_once() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let image = image::RgbaImage::from_fn(64, 32, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
+    image.save(folder.path().join("a.png")).expect("writable");
+    let balls: String = (0..100)
+        .map(|k| format!(r#""{k}": (shape: Sphere(), material: "{}"),"#, ["m", "n"][k % 2]))
+        .collect();
+    let text = format!(
+        r#"(
+    textures: {{ "a": Image(file: "a.png"), "b": Image(file: "./a.png", wrap: Mirror) }},
+    materials: {{ "m": Diffuse(albedo: "a"), "n": Mirror(reflectance: "b") }},
+    entities: {{ "camera": (camera: ()), {balls} "sky": (light: Sky(radiance: "a")) }},
+)"#
+    );
+    let path = folder.path().join("a.ron");
+    std::fs::write(&path, text).expect("writable");
+    let scene = kinora::description::load_scene(&path, &Default::default());
+    let mut scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+    (scene.render.size, scene.render.samples) = ((4, 4), 1);
+    let report = render_description(&scene, 0).report;
+    let textures = report.table_bytes.iter().find(|(name, _)| *name == "textures");
+    // 64 × 32 texels of 4 bytes, then 32 × 16, …, 2 × 1, 1 × 1.
+    let texels = 2048 + 512 + 128 + 32 + 8 + 2 + 1;
+    assert_eq!(textures, Some(&("textures", 4 * texels)));
+}
+
 /// Photons see bumps and textures as paths do.
 #[test]
 fn photons_and_paths_see_the_same_textures() {

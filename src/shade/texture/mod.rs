@@ -14,6 +14,7 @@ mod solid;
 pub use point::TexturePoint;
 pub use pyramid::Pyramid;
 
+use crate::color::luminance;
 use crate::description::{ImageData, Rgb, Texture, TextureFiltering, Value};
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
 use pattern::Wall;
@@ -23,12 +24,6 @@ use std::sync::Arc;
 
 /// A texture as a frame uses it: its pixels shared, other textures by index.
 pub type RenderTexture = Texture<Arc<Pyramid>, u32>;
-
-/// Rec. 709 luminance of a linear colour (Rec. ITU-R BT.709-6, item 3.2, rounded weights).
-#[inline]
-pub(crate) fn luminance(color: Rgb) -> f32 {
-    color.dot(Rgb::new(0.2126, 0.7152, 0.0722))
-}
 
 /// What a texture is asked for: a colour, or a number.
 trait Sample:
