@@ -5,10 +5,10 @@ mod bounds;
 mod cone;
 mod cubic;
 mod frame;
+pub(crate) mod instructions;
 mod motion;
 pub(crate) mod profile;
 mod ray;
-
 mod rounding;
 mod swept;
 
@@ -20,6 +20,5 @@ pub use motion::{Decomposed, MotionTransform};
 pub(crate) use profile::bracketed_root;
 pub use profile::{Jet, Piece, Profile, ProfileError};
 pub use ray::Ray;
-
 pub use rounding::{gamma, gamma_f64, offset_ray_origin};
 pub use swept::swept_bounds;

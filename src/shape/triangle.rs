@@ -16,15 +16,19 @@ pub struct TriangleTest {
     pub(crate) shear: DVec3,
 }
 
+/// The two axes before each, in turn. A table that stays where it is: one on the stack would be written for
+/// every ray.
+static BEFORE: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
 impl TriangleTest {
     /// Prepares a ray.
     #[inline]
     pub fn new(ray: &LocalRay) -> Self {
         let size = ray.d.abs();
         // Without branches, which the directions of bounced rays would mislead.
-        let x_longest = size.x > size.y.max(size.z);
-        let z = usize::from(!x_longest) * (2 - usize::from(size.y > size.z));
-        let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
+        let other = if size.y > size.z { size.y } else { size.z };
+        let z = usize::from(size.x <= other) * (2 - usize::from(size.y > size.z));
+        let [x, y] = BEFORE[z];
         let d = ray.d.to_array();
         Self { o: ray.o, axes: [x, y, z], shear: DVec3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]) }
     }

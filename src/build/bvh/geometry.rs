@@ -2,7 +2,6 @@
 
 use super::movers::Movers;
 use super::top::{Joined, Leaf};
-use super::wide::sphere_hits;
 use super::{MeshTree, TopLevel};
 use crate::extract::{Geometry, Instance};
 use crate::math::{MotionTransform, Ray};
@@ -90,7 +89,7 @@ impl SceneGeometry<'_> {
             match (Leaf::of(name), &self.top.joined) {
                 (Leaf::Spheres(block), _) => {
                     let block = &self.top.spheres[block];
-                    let t = sphere_hits(block, &whole, end);
+                    let t = block.hits(&whole, end);
                     for (t, instance) in t.into_iter().zip(block.instances) {
                         nearest.offer_sphere(t, instance);
                     }
@@ -151,7 +150,7 @@ impl SceneGeometry<'_> {
         let mut visit = |name: u32, t_max: f64| {
             blocked = match (Leaf::of(name), &self.top.joined) {
                 (Leaf::Spheres(block), _) => {
-                    let t = sphere_hits(&self.top.spheres[block], &whole, t_max);
+                    let t = self.top.spheres[block].hits(&whole, t_max);
                     t.iter().any(|t| *t < f64::INFINITY)
                 }
                 (Leaf::Resting, Some(joined)) => {

@@ -17,6 +17,7 @@
 
 use crate::extract::{Geometry, Instance, NOTHING};
 use crate::math::MotionTransform;
+use crate::math::instructions::{Lanewise, widest};
 use crate::shape::{LocalRay, Primitive};
 
 /// Spheres of a block.
@@ -24,6 +25,22 @@ pub(super) const LANES: usize = 4;
 
 /// A number for each sphere of a block.
 type Row = [f64; LANES];
+
+/// The test of a block.
+struct Test<'a> {
+    block: &'a SphereBlock,
+    ray: &'a LocalRay,
+    t_max: f64,
+}
+
+impl Lanewise for Test<'_> {
+    type Output = Row;
+
+    #[inline(always)]
+    fn run(self) -> Row {
+        self.block.hits_here(self.ray, self.t_max)
+    }
+}
 
 /// Four spheres.
 #[repr(C, align(32))]
@@ -58,8 +75,14 @@ impl SphereBlock {
     /// infinity.
     ///
     /// The steps of [`Primitive::intersect`] in the space of each sphere, each for all lanes.
-    #[inline(always)]
+    #[inline]
     pub(super) fn hits(&self, ray: &LocalRay, t_max: f64) -> Row {
+        widest(Test { block: self, ray, t_max })
+    }
+
+    /// The same with the instructions of whatever calls it.
+    #[inline(always)]
+    fn hits_here(&self, ray: &LocalRay, t_max: f64) -> Row {
         let o: [Row; 3] = each(|axis| {
             let (o, shift) = (ray.o[axis], &self.shift[axis]);
             each(|k| self.scale[k] * o + shift[k])
@@ -104,7 +127,6 @@ pub(super) fn joinable(instance: &Instance) -> Option<(f64, [f64; 3])> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wide::sphere_hits;
     use super::*;
     use crate::math::Aabb;
     use crate::sampling::Sampler;
@@ -155,9 +177,9 @@ mod tests {
             let d = if number % 50 == 0 { glam::Vec3::ZERO } else { towards };
             let ray = LocalRay { o: o.as_dvec3(), d: d.as_dvec3() };
             // The end of a ray is not included: one ends where it would hit.
-            let ends = [f64::INFINITY, 1.0, block.hits(&ray, f64::INFINITY)[0]];
+            let ends = [f64::INFINITY, 1.0, block.hits_here(&ray, f64::INFINITY)[0]];
             let t_max = ends[number as usize % 3];
-            for hits in [block.hits(&ray, t_max), sphere_hits(&block, &ray, t_max)] {
+            for hits in [block.hits_here(&ray, t_max), block.hits(&ray, t_max)] {
                 for (instance, t) in spheres.iter().zip(hits) {
                     let inverse = instance.motion.inverse_at(0.0);
                     let local = LocalRay {

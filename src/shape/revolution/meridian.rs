@@ -141,7 +141,7 @@ pub(super) struct Passages {
 impl Narrow {
     /// The parts of `from..to` inside of the rings of a node: all in step, so that the compiler makes vectors
     /// of them.
-    #[inline]
+    #[inline(always)]
     #[expect(
         clippy::needless_bitwise_bool,
         reason = "a branch for each ring would undo the vectors"
@@ -167,7 +167,7 @@ impl Narrow {
     }
 
     /// Signed distance from the closest approach at a length along the ray.
-    #[inline]
+    #[inline(always)]
     pub(super) fn q(&self, sigma: f32) -> f32 {
         self.c + self.w * sigma
     }
@@ -350,13 +350,13 @@ impl Side for Shallow {
 }
 
 /// The smaller of two numbers; unlike `min`, one instruction, for it need not look for NaN.
-#[inline]
+#[inline(always)]
 fn smaller<T: PartialOrd>(a: T, b: T) -> T {
     if a < b { a } else { b }
 }
 
 /// The larger of two numbers.
-#[inline]
+#[inline(always)]
 fn larger<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }

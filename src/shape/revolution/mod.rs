@@ -4,6 +4,11 @@
 //! A closed surface, one which bounds a solid, faces outwards; an open one faces to the right of the way along
 //! its profile, radii growing to the right and heights upwards.
 
+#![expect(
+    clippy::inline_always,
+    reason = "vector instructions are used only where this is inlined into a function that has them"
+)]
+
 mod meet;
 mod meridian;
 

@@ -3,7 +3,6 @@
 use super::Instructions;
 use super::node::{Child, Node, WIDTH};
 use super::pages::on_large_pages;
-use super::ray::BoxRay;
 use super::stack::Stack;
 use super::traverse::{Distances, Lanes, Portable, child_of, distance_of, key, take_lane};
 use crate::build::bvh::Bvh;
@@ -167,19 +166,18 @@ impl BoxTree {
         if self.nodes.is_empty() {
             return;
         }
-        let Some(prepared) = BoxRay::new(ray) else { return };
         let instructions = Instructions::detect().fit_for(ray, self.reach);
         match (instructions, self.stack <= SHORT_STACK) {
             #[cfg(target_arch = "x86_64")]
             (Instructions::Avx2(avx2), true) => {
-                avx2.visit_boxes::<SHORT_STACK>(self, &prepared, t_max, visit);
+                avx2.visit_boxes::<SHORT_STACK>(self, ray, t_max, visit);
             }
             #[cfg(target_arch = "x86_64")]
             (Instructions::Avx2(avx2), false) => {
-                avx2.visit_boxes::<STACK>(self, &prepared, t_max, visit);
+                avx2.visit_boxes::<STACK>(self, ray, t_max, visit);
             }
             (Instructions::Portable, _) => {
-                visit_boxes::<Portable, STACK>(self, &prepared, t_max, visit);
+                visit_boxes::<Portable, STACK>(self, ray, t_max, visit);
             }
         }
     }
@@ -189,11 +187,12 @@ impl BoxTree {
 #[inline(always)]
 pub(super) fn visit_boxes<L: Lanes, const STACK: usize>(
     tree: &BoxTree,
-    prepared: &BoxRay,
+    ray: &LocalRay,
     mut t_max: f64,
     mut visit: impl FnMut(u32, f64) -> f64,
 ) {
-    let boxes = L::prepare_boxes(prepared, tree.reach);
+    let Some(prepared) = L::prepare(ray) else { return };
+    let boxes = L::prepare_boxes(&prepared, tree.reach);
     let mut end = prepared.distance(t_max);
     let mut stack = Stack::<u64, STACK>::new();
     let mut distances = Distances::default();

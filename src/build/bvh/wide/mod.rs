@@ -41,7 +41,6 @@ pub use moving::MovingTree;
 pub(super) use moving::segment_of;
 pub use traverse::TriangleHit;
 
-use super::spheres::{LANES, SphereBlock};
 use crate::description::{BvhQuality, TriangleMesh};
 use crate::math::Aabb;
 use crate::shape::LocalRay;
@@ -51,7 +50,9 @@ use node::{BLOCK, Block, Child, Node, WIDTH};
 use rayon::prelude::*;
 use traverse::{BlockHits, Lanes, Nodes, Portable, any_hit, closest_hit};
 
-/// Room on the stack that is enough for all but odd trees.
+/// Room on the stack that is enough for two levels of nodes, which lie in the cache with their blocks.
+const TINY_STACK: usize = 2 * (WIDTH - 1) + 1;
+/// Room that is enough for all but odd trees.
 const SHORT_STACK: usize = 96;
 /// Room that is enough for any tree: every level leaves all children but one on the stack.
 const LONG_STACK: usize = DEEPEST * (WIDTH - 1) + 1;
@@ -108,7 +109,11 @@ impl Instructions {
     /// These, or plain ones for rays and boxes of a size that they are not made for.
     #[inline]
     fn fit_for(self, ray: &LocalRay, reach: f32) -> Self {
-        if ray::can_be_fused(ray, reach) { self } else { Self::Portable }
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(avx2) if avx2.fits(ray, reach) => self,
+            _ => Self::Portable,
+        }
     }
 
     /// The nearest hit in a tree whose traversal takes `stack` places.
@@ -120,38 +125,39 @@ impl Instructions {
         ray: &LocalRay,
         t_max: f64,
     ) -> Option<TriangleHit> {
-        match (self.fit_for(ray, tree.reach()), stack <= SHORT_STACK) {
+        match (self.fit_for(ray, tree.reach()), stack) {
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), true) => avx2.closest_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=TINY_STACK) => {
+                avx2.closest_hit::<N, TINY_STACK>(tree, ray, t_max)
+            }
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), false) => avx2.closest_hit::<N, LONG_STACK>(tree, ray, t_max),
-            (Self::Portable, true) => closest_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
-            (Self::Portable, false) => closest_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=SHORT_STACK) => {
+                avx2.closest_hit::<N, SHORT_STACK>(tree, ray, t_max)
+            }
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), _) => avx2.closest_hit::<N, LONG_STACK>(tree, ray, t_max),
+            (Self::Portable, ..=SHORT_STACK) => {
+                closest_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max)
+            }
+            (Self::Portable, _) => closest_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
         }
     }
 
     /// Whether anything is hit in a tree whose traversal takes `stack` places.
     #[inline]
     fn any_hit<N: Nodes>(self, tree: &N, stack: usize, ray: &LocalRay, t_max: f64) -> bool {
-        match (self.fit_for(ray, tree.reach()), stack <= SHORT_STACK) {
+        match (self.fit_for(ray, tree.reach()), stack) {
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), true) => avx2.any_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=TINY_STACK) => avx2.any_hit::<N, TINY_STACK>(tree, ray, t_max),
             #[cfg(target_arch = "x86_64")]
-            (Self::Avx2(avx2), false) => avx2.any_hit::<N, LONG_STACK>(tree, ray, t_max),
-            (Self::Portable, true) => any_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max),
-            (Self::Portable, false) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
+            (Self::Avx2(avx2), ..=SHORT_STACK) => avx2.any_hit::<N, SHORT_STACK>(tree, ray, t_max),
+            #[cfg(target_arch = "x86_64")]
+            (Self::Avx2(avx2), _) => avx2.any_hit::<N, LONG_STACK>(tree, ray, t_max),
+            (Self::Portable, ..=SHORT_STACK) => {
+                any_hit::<Portable, N, SHORT_STACK>(tree, ray, t_max)
+            }
+            (Self::Portable, _) => any_hit::<Portable, N, LONG_STACK>(tree, ray, t_max),
         }
-    }
-}
-
-/// Where a ray in render space meets the spheres of a block with `0 < t < t_max`; infinity where it does
-/// not.
-#[inline]
-pub(super) fn sphere_hits(block: &SphereBlock, ray: &LocalRay, t_max: f64) -> [f64; LANES] {
-    match Instructions::detect() {
-        #[cfg(target_arch = "x86_64")]
-        Instructions::Avx2(avx2) => avx2.sphere_hits(block, ray, t_max),
-        Instructions::Portable => block.hits(ray, t_max),
     }
 }
 

@@ -17,7 +17,8 @@ pub(super) struct Stack<T, const N: usize> {
 impl<T: Copy + PartialOrd, const N: usize> Stack<T, N> {
     #[inline(always)]
     pub(super) fn new() -> Self {
-        Self { places: [MaybeUninit::uninit(); N], depth: 0 }
+        // A constant: the same value `N` times over would be copied, place by place.
+        Self { places: [const { MaybeUninit::uninit() }; N], depth: 0 }
     }
 
     /// Number of entries.

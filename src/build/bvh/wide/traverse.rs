@@ -8,6 +8,7 @@
 //! ([`BoxRay::reaches`]). So the answer is that of testing every triangle by itself, bit for bit,
 //! whatever the tree looks like and whichever set of instructions ran.
 
+use super::TINY_STACK;
 use super::node::{BLOCK, Block, Child, Node, WIDTH};
 use super::ray::BoxRay;
 use super::stack::Stack;
@@ -87,12 +88,17 @@ pub(super) trait Lanes {
     /// The ray as the triangle test wants it.
     type Triangles: Copy;
 
+    /// [`BoxRay::new`].
+    fn prepare(ray: &LocalRay) -> Option<BoxRay>;
     /// `reach` is that of the boxes: none of their coordinates is farther from 0.
     fn prepare_boxes(ray: &BoxRay, reach: f32) -> Self::Boxes;
     fn prepare_triangles(test: &TriangleTest) -> Self::Triangles;
 
     /// Which boxes the ray meets at a distance in `[0, end]`, and where.
     fn enter(ray: &Self::Boxes, node: &Node, end: f32, distances: &mut Distances) -> u32;
+
+    /// [`BoxRay::reaches`].
+    fn reaches(ray: &BoxRay, bounds: &Aabb, t: f64) -> bool;
 
     /// Which triangles the ray meets with `0 < t < t_max`, and where.
     fn hit(ray: &Self::Triangles, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32;
@@ -116,6 +122,11 @@ pub(super) struct Portable;
 impl Lanes for Portable {
     type Boxes = BoxRay;
     type Triangles = TriangleTest;
+
+    #[inline(always)]
+    fn prepare(ray: &LocalRay) -> Option<BoxRay> {
+        BoxRay::new(ray)
+    }
 
     #[inline(always)]
     fn prepare_boxes(ray: &BoxRay, _: f32) -> BoxRay {
@@ -143,6 +154,11 @@ impl Lanes for Portable {
         }
         distances.0 = near;
         (0..WIDTH).fold(0, |mask, lane| mask | (u32::from(near[lane] <= far[lane]) << lane))
+    }
+
+    #[inline(always)]
+    fn reaches(ray: &BoxRay, bounds: &Aabb, t: f64) -> bool {
+        ray.reaches(bounds, t)
     }
 
     #[inline(always)]
@@ -210,10 +226,10 @@ pub(super) fn take_lane(mask: &mut u32) -> usize {
 
 /// [`BoxRay::reaches`], for a ray that was prepared already or is now.
 #[inline(always)]
-fn is_met(ray: &LocalRay, prepared: Option<&BoxRay>, bounds: &Aabb, t: f64) -> bool {
+fn is_met<L: Lanes>(ray: &LocalRay, prepared: Option<&BoxRay>, bounds: &Aabb, t: f64) -> bool {
     match prepared {
-        Some(prepared) => prepared.reaches(bounds, t),
-        None => BoxRay::new(ray).is_some_and(|prepared| prepared.reaches(bounds, t)),
+        Some(prepared) => L::reaches(prepared, bounds, t),
+        None => L::prepare(ray).is_some_and(|prepared| L::reaches(&prepared, bounds, t)),
     }
 }
 
@@ -236,7 +252,7 @@ fn nearest_of_leaf<L: Lanes, N: Nodes>(
             let lane = take_lane(&mut mask) % BLOCK;
             let (t, triangle) = (hits.t[lane], tree.triangle(block, lane));
             if best.is_none_or(|best| (t, triangle) < (best.t, best.triangle))
-                && is_met(ray, prepared, &tree.triangle_bounds(block, lane), t)
+                && is_met::<L>(ray, prepared, &tree.triangle_bounds(block, lane), t)
             {
                 let weights = DVec2::new(hits.second[lane], hits.third[lane]);
                 *best = Some(TriangleHit { t, triangle, weights });
@@ -262,7 +278,7 @@ fn leaf_blocks<L: Lanes, N: Nodes>(
         let mut mask = tree.hit::<L>(block, triangles, t_max, hits);
         while mask != 0 {
             let lane = take_lane(&mut mask) % BLOCK;
-            if is_met(ray, prepared, &tree.triangle_bounds(block, lane), hits.t[lane]) {
+            if is_met::<L>(ray, prepared, &tree.triangle_bounds(block, lane), hits.t[lane]) {
                 return true;
             }
         }
@@ -270,9 +286,17 @@ fn leaf_blocks<L: Lanes, N: Nodes>(
     false
 }
 
+/// Asks for a child ahead of time, unless the tree is so small that it is at hand.
+#[inline(always)]
+fn ask_for<L: Lanes, N: Nodes, const STACK: usize>(tree: &N, child: Child) {
+    if STACK > TINY_STACK {
+        L::prefetch(tree.place(child));
+    }
+}
+
 /// The child in the lowest lane of a mask, asked for ahead of time.
 #[inline(always)]
-fn take_child<L: Lanes, N: Nodes>(
+fn take_child<L: Lanes, N: Nodes, const STACK: usize>(
     tree: &N,
     node: &Node,
     distances: &Distances,
@@ -280,7 +304,7 @@ fn take_child<L: Lanes, N: Nodes>(
 ) -> Key {
     let lane = take_lane(mask);
     let child = node.children[lane];
-    L::prefetch(tree.place(child));
+    ask_for::<L, N, STACK>(tree, child);
     key(distances.0[lane], child)
 }
 
@@ -303,7 +327,7 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
         );
         return best;
     }
-    let prepared = BoxRay::new(ray)?;
+    let prepared = L::prepare(ray)?;
     let boxes = L::prepare_boxes(&prepared, tree.reach());
     let mut end = prepared.distance(t_max);
     let mut stack = Stack::<Key, STACK>::new();
@@ -330,19 +354,19 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
             let node = tree.node(current.index(), &mut scratch);
             let mut mask = L::enter(&boxes, node, end, &mut distances);
             if mask != 0 {
-                let a = take_child::<L, N>(tree, node, &distances, &mut mask);
+                let a = take_child::<L, N, STACK>(tree, node, &distances, &mut mask);
                 if mask == 0 {
                     current = child_of(a);
                     continue;
                 }
-                let b = take_child::<L, N>(tree, node, &distances, &mut mask);
+                let b = take_child::<L, N, STACK>(tree, node, &distances, &mut mask);
                 let (a, b) = (a.min(b), a.max(b));
                 if mask == 0 {
                     stack.push(b);
                     current = child_of(a);
                     continue;
                 }
-                let c = take_child::<L, N>(tree, node, &distances, &mut mask);
+                let c = take_child::<L, N, STACK>(tree, node, &distances, &mut mask);
                 let (a, c) = (a.min(c), a.max(c));
                 let (b, c) = (b.min(c), b.max(c));
                 if mask == 0 {
@@ -356,7 +380,10 @@ pub(super) fn closest_hit<L: Lanes, N: Nodes, const STACK: usize>(
                     stack.push(key);
                 }
                 while mask != 0 {
-                    stack.insert(bottom, take_child::<L, N>(tree, node, &distances, &mut mask));
+                    stack.insert(
+                        bottom,
+                        take_child::<L, N, STACK>(tree, node, &distances, &mut mask),
+                    );
                 }
             }
         }
@@ -384,7 +411,7 @@ pub(super) fn any_hit<L: Lanes, N: Nodes, const STACK: usize>(
     if tree.root().is_leaf() {
         return leaf_blocks::<L, N>(tree, tree.root(), ray, None, &triangles, t_max, &mut hits);
     }
-    let Some(prepared) = BoxRay::new(ray) else { return false };
+    let Some(prepared) = L::prepare(ray) else { return false };
     let boxes = L::prepare_boxes(&prepared, tree.reach());
     let end = prepared.distance(t_max);
     let mut stack = Stack::<u32, STACK>::new();
@@ -402,7 +429,7 @@ pub(super) fn any_hit<L: Lanes, N: Nodes, const STACK: usize>(
             let mut mask = L::enter(&boxes, node, end, &mut distances);
             while mask != 0 {
                 let child = node.children[take_lane(&mut mask)];
-                L::prefetch(tree.place(child));
+                ask_for::<L, N, STACK>(tree, child);
                 if mask == 0 {
                     current = child;
                     continue 'next;
