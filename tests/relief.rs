@@ -161,11 +161,11 @@ fn only_the_displaced_panel_has_a_broken_outline() {
         rows.collect()
     };
     // The edges lean by less than a pixel in 50 rows: half a row is a hundredth of a pixel.
-    for panel in 0..3 {
+    for (panel, name) in PANELS.iter().enumerate().take(3) {
         let strays = strays(panel);
-        assert!(strays.len() > 350, "{}: {}", PANELS[panel], strays.len());
+        assert!(strays.len() > 350, "{name}: {}", strays.len());
         for stray in strays {
-            assert!(stray.abs() <= 1.51, "{}: {stray} pixels", PANELS[panel]);
+            assert!(stray.abs() <= 1.51, "{name}: {stray} pixels");
         }
     }
     let strays = strays(3);

@@ -14,7 +14,6 @@ pub(super) struct Gathered {
     mesh: TriangleMesh,
     any_uv: bool,
     any_normal: bool,
-    any_tangent: bool,
     any_color: bool,
 }
 
@@ -63,7 +62,6 @@ impl Gathered {
         }
         self.any_uv |= uvs.is_some();
         self.any_normal |= normals.is_some();
-        self.any_tangent |= tangents.is_some();
         self.any_color |= colors.is_some();
         let place =
             |p: &[f32; 3]| transform.transform_point3(DVec3::from(p.map(f64::from))).as_vec3();
@@ -102,7 +100,7 @@ impl Gathered {
         if !self.any_normal {
             self.mesh.normals = Vec::new();
         }
-        if !self.any_tangent {
+        if self.mesh.tangents.iter().all(|tangent| tangent.w == 0.0) {
             self.mesh.tangents = Vec::new();
         }
         if !self.any_color {

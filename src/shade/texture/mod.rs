@@ -19,7 +19,7 @@ use crate::description::{ImageData, Rgb, Texture, TextureFiltering, Value};
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
 use pattern::Wall;
 use solid::Octaves;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// A texture as a frame uses it: its pixels shared, other textures by index.
@@ -209,8 +209,14 @@ impl Textures {
 
     /// Bytes of all images and their pyramids, each counted once.
     pub fn memory(&self) -> usize {
-        let bytes = |pyramid: &Arc<Pyramid>| pyramid.base.memory() + pyramid.memory();
-        self.pyramids().0.values().map(bytes).sum()
+        let (mut images, mut pyramids, mut bytes) = (HashSet::new(), HashSet::new(), 0);
+        for texture in &self.list {
+            let Texture::Image { file, .. } = texture else { continue };
+            bytes += if pyramids.insert(Arc::as_ptr(file)) { file.memory() } else { 0 };
+            let image = &file.base;
+            bytes += if images.insert(Arc::as_ptr(image)) { image.memory() } else { 0 };
+        }
+        bytes
     }
 
     /// Mean colour of a texture over the unit square: for the power of a textured light. Exact for images and
