@@ -5,7 +5,7 @@ mod common;
 use common::{Picture, render, render_description, scene};
 use glam::{DVec3, Vec3};
 use kinora::description::{
-    Channel, Encoding, ImageData, ImagePixels, SceneTexture, Texture, TextureFilter,
+    Channel, Encoding, ImageData, ImagePixels, LoadOptions, SceneTexture, Texture, TextureFilter,
     TextureFiltering, Wrap,
 };
 
@@ -391,9 +391,10 @@ fn an_image_is_in_memory_once() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let image = image::RgbaImage::from_fn(64, 32, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
     image.save(folder.path().join("a.png")).expect("writable");
-    let balls: String = (0..100)
+    let balls: Vec<String> = (0..100)
         .map(|k| format!(r#""{k}": (shape: Sphere(), material: "{}"),"#, ["m", "n"][k % 2]))
         .collect();
+    let balls = balls.concat();
     let text = format!(
         r#"(
     textures: {{ "a": Image(file: "a.png"), "b": Image(file: "./a.png", wrap: Mirror) }},
@@ -403,7 +404,7 @@ fn an_image_is_in_memory_once() {
     );
     let path = folder.path().join("a.ron");
     std::fs::write(&path, text).expect("writable");
-    let scene = kinora::description::load_scene(&path, &Default::default());
+    let scene = kinora::description::load_scene(&path, &LoadOptions::default());
     let mut scene = scene.unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
     (scene.render.size, scene.render.samples) = ((4, 4), 1);
     let report = render_description(&scene, 0).report;
