@@ -64,7 +64,7 @@ pub struct FrameReport {
     pub system_seconds: Vec<(&'static str, f64)>,
     /// What was rebuilt, in words: `"instances: 3 of 10"`, `"top level"`, `"meshes: 1"`.
     pub rebuilt: Vec<String>,
-    /// Bytes held by the tables and trees of the scene, by name.
+    /// Bytes held by the images (each counted once, its smaller copies with it), the tables and the trees of the scene, by name.
     pub table_bytes: Vec<(&'static str, u64)>,
     /// Pixel samples taken.
     pub samples: u64,
@@ -405,7 +405,9 @@ impl Simulation {
             self.world.resource::<MeshTrees>().list.iter().map(|tree| tree.memory()).sum();
         let resting = self.world.resource::<RestingTree>().memory();
         let top = self.world.resource::<TopLevel>().memory();
+        let textures = self.world.resource::<Surfaces>().materials.textures().memory();
         vec![
+            ("textures", textures as u64),
             ("instances", instances as u64),
             ("mesh trees", trees as u64),
             ("tree of resting meshes", resting as u64),

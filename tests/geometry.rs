@@ -50,13 +50,7 @@ impl Uniforms {
 }
 
 fn mesh_of(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Arc<MeshTree> {
-    let mesh = TriangleMesh {
-        positions,
-        triangles,
-        normals: Vec::new(),
-        uvs: Vec::new(),
-        colors: Vec::new(),
-    };
+    let mesh = TriangleMesh { positions, triangles, ..Default::default() };
     Arc::new(MeshTree::build(Arc::new(mesh), BvhQuality::default()))
 }
 

@@ -111,7 +111,7 @@ fn facing_origin(corners: &[DVec3]) -> TriangleMesh {
         .map(|k| if faces { [0, k - 1, k] } else { [0, k, k - 1] })
         .collect();
     let positions = corners.iter().map(|p| p.as_vec3()).collect();
-    TriangleMesh { positions, normals: Vec::new(), uvs: Vec::new(), colors: Vec::new(), triangles }
+    TriangleMesh { positions, triangles, ..Default::default() }
 }
 
 /// Oracle: Lambert's formula: 0.2589539 with the floor facing z, 0.2312857 with it facing (2, 3, 6)/7.

@@ -1,11 +1,11 @@
-//! How fast the renderer is, in one table: rays, surfaces of revolution, builds, samples, frames, and how they grow.
+//! How fast the renderer is, in one table: rays, surfaces of revolution, builds, samples, what filtered textures are worth, frames, and how they grow.
 //!
 //! `cargo bench --bench speed` runs everything but the convergence; after `--`:
 //!
 //! ```text
 //! --quick         smaller meshes, fewer repetitions
 //! --json FILE     the same numbers by the same names
-//! --only A,B      of rays, revolution, build, shapes, motion, samples, frame, growth
+//! --only A,B      of rays, revolution, build, shapes, motion, samples, textures, frame, growth
 //! --convergence   CPU-seconds of whole renders to a relMSE of 1e-3, and their memory
 //! ```
 //!
@@ -23,6 +23,7 @@ mod report;
 mod revolution;
 mod samples;
 mod shapes;
+mod textures;
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -85,13 +86,14 @@ fn main() -> ExitCode {
         }
     };
     let mut report = Report::default();
-    let sections: [(&str, fn(&Options, &mut Report)); 8] = [
+    let sections: [(&str, fn(&Options, &mut Report)); 9] = [
         ("rays", rays::run),
         ("revolution", revolution::run),
         ("build", builds::run),
         ("shapes", shapes::run),
         ("motion", motion::run),
         ("samples", samples::run),
+        ("textures", textures::run),
         ("frame", frames::run),
         ("growth", growth::run),
     ];

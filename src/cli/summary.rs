@@ -17,6 +17,8 @@ pub struct Summary {
     /// Samples which were not finite, and numbers too large for 16 bits.
     non_finite: u64,
     saturated: u64,
+    /// Most bytes of images in a frame.
+    texture_bytes: u64,
     /// What the photons of all frames came to.
     photons: Option<PhotonReport>,
     /// Frames rendered by this run, and frames found finished.
@@ -33,6 +35,7 @@ impl Summary {
             rays: 0,
             non_finite: 0,
             saturated: 0,
+            texture_bytes: 0,
             photons: None,
             rendered: 0,
             kept,
@@ -45,6 +48,8 @@ impl Summary {
         self.rays += entry.report.rays;
         self.non_finite += entry.report.non_finite;
         self.saturated += entry.saturated;
+        let textures = entry.report.table_bytes.iter().find(|(name, _)| *name == "textures");
+        self.texture_bytes = self.texture_bytes.max(textures.map_or(0, |(_, bytes)| *bytes));
         if let Some(photons) = &entry.report.photons {
             self.photons = Some(self.photons.take().map_or(*photons, |sum| sum.plus(photons)));
         }
@@ -106,6 +111,10 @@ impl Summary {
         if let Some(photons) = &self.photons {
             lines.push(format!("  photons  {}", photon_line(photons)));
         }
+        if self.texture_bytes > 0 {
+            let bytes = format::bytes(self.texture_bytes);
+            lines.push(format!("  textures {bytes} of images and their smaller copies"));
+        }
         if let Some(bytes) = peak_memory_bytes() {
             lines.push(format!("  memory   {} at most", format::bytes(bytes)));
         }
@@ -119,7 +128,7 @@ impl Summary {
         json!({
             "outcome": outcome, "rendered": self.rendered, "kept": self.kept,
             "seconds": self.start.elapsed().as_secs_f64(), "stage_seconds": stages,
-            "samples": self.samples, "rays": self.rays, "photons": self.photons,
+            "samples": self.samples, "rays": self.rays, "photons": self.photons, "texture_bytes": self.texture_bytes,
             "peak_memory_bytes": peak_memory_bytes(), "out": folder,
         })
     }

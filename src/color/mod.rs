@@ -18,6 +18,7 @@ pub const CHROMATICITIES: [(f32, f32); 4] =
 pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
 /// Relative luminance of a linear colour: 1 for white.
+#[inline]
 pub fn luminance(rgb: Vec3) -> f32 {
     rgb.dot(LUMINANCE_WEIGHTS)
 }

@@ -96,7 +96,7 @@ impl<R> Shape<R> {
 
 /// Triangles with shared vertices, in metres.
 ///
-/// `normals`, `uvs` and `colors` are empty or as long as `positions`. Counter-clockwise triangles face the
+/// `normals`, `uvs`, `tangents` and `colors` are empty or as long as `positions`. Counter-clockwise triangles face the
 /// viewer. `v` grows upwards in an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -106,6 +106,9 @@ pub struct TriangleMesh {
     pub normals: Vec<glam::Vec3>,
     /// Texture coordinates, or empty: (0, 0), (1, 0), (1, 1) on every triangle.
     pub uvs: Vec<glam::Vec2>,
+    /// Unit tangents that a normal map was made for, and the sign of `normal × tangent` along its green; 0 where
+    /// none is given. Empty where none is: they follow from the coordinates.
+    pub tangents: Vec<glam::Vec4>,
     /// Linear colours of the vertices, or empty: white.
     pub colors: Vec<Rgb>,
     /// Three vertex indices per triangle, all in range.

@@ -88,7 +88,7 @@ impl Waves {
             }
         }
         let normals = vec![Vec3::Y; positions.len()];
-        TriangleMesh { positions, normals, uvs, colors: Vec::new(), triangles }
+        TriangleMesh { positions, normals, uvs, triangles, ..Default::default() }
     }
 }
 

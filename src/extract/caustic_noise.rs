@@ -16,10 +16,10 @@
 //! All areas are those of axis-parallel boxes, so that flat things count twice, on both sides of the fraction.
 
 use super::{Emissions, Instances, NOTHING, PunctualLight, Surfaces};
+use crate::color::luminance;
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::math::Aabb;
 use crate::shade::MaterialTable;
-use crate::shade::texture::luminance;
 use std::f64::consts::PI;
 
 /// `Σ A·L` and `Σ A·L²` over the lamps.

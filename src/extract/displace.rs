@@ -201,6 +201,8 @@ fn moved(
         *p = (p.as_dvec3() + sum / count).as_vec3();
     });
     moved.normals = smooth_normals(&moved, &weld);
+    // Those given belong to the surface at rest.
+    moved.tangents = Vec::new();
     moved
 }
 

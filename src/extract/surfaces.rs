@@ -65,7 +65,12 @@ fn needs_of(
                 open.push(material);
                 Ok(())
             };
-            let Ok(_) = materials[part as usize].clone().map_refs(&mut texture, &mut material);
+            let part = &materials[part as usize];
+            let Ok(_) = part.clone().map_refs(&mut texture, &mut material);
+            if let (Some(need), crate::description::Material::NormalMap { .. }) = (&mut *need, part)
+            {
+                need.tangents = true;
+            }
         }
     }
     needs

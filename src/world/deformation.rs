@@ -69,7 +69,10 @@ impl VertexMotion {
         let mut keys = keys.into_iter();
         let Vertices { positions, normals } = keys.next().expect("a motion has a first key");
         let TriangleMesh { uvs, colors, triangles, .. } = (**rest.data()).clone();
-        let opening = Arc::new(TriangleMesh { positions, normals, uvs, colors, triangles });
+        // Tangents of the mesh at rest are not those of another form.
+        let tangents = Vec::new();
+        let opening =
+            Arc::new(TriangleMesh { positions, normals, uvs, tangents, colors, triangles });
         Self { opening, later: Arc::new(keys.collect()), bounds, made_for: Some(made_for) }
     }
 

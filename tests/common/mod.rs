@@ -182,7 +182,7 @@ pub fn icosphere(levels: u32, smooth: bool) -> TriangleMesh {
             .collect();
     }
     let normals = if smooth { positions.clone() } else { Vec::new() };
-    TriangleMesh { positions, normals, uvs: Vec::new(), colors: Vec::new(), triangles }
+    TriangleMesh { positions, normals, triangles, ..Default::default() }
 }
 
 /// A mesh as a scene says it, under the name `name`.

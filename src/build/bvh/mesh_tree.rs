@@ -2,7 +2,7 @@
 
 use super::resting::RestingTree;
 use super::wide::segment_of;
-use super::{MovingTree, TriangleHit, WideTree};
+use super::{MovingTree, Tangents, TriangleHit, WideTree};
 use crate::description::{BvhQuality, TriangleMesh};
 use crate::extract::{Geometry, Instances, Meshes};
 use crate::math::Aabb;
@@ -20,6 +20,8 @@ pub struct MeshTree {
     pub mesh: Arc<TriangleMesh>,
     /// Its vertices at the later keys of the shutter; none for a mesh which keeps its form.
     later: Arc<Vec<Vertices>>,
+    /// What normal maps on it are made for, where there is one.
+    pub(super) tangents: Option<Arc<Tangents>>,
     tree: Tree,
     quality: BvhQuality,
 }
@@ -39,7 +41,7 @@ impl MeshTree {
     /// Builds the tree of a mesh.
     pub fn build(mesh: Arc<TriangleMesh>, quality: BvhQuality) -> Self {
         let tree = Tree::Rigid(WideTree::build(&mesh, quality));
-        Self { mesh, later: Arc::default(), tree, quality }
+        Self { mesh, later: Arc::default(), tangents: None, tree, quality }
     }
 
     /// Builds the tree of a mesh which has these vertices later in the shutter, at evenly spaced times.
@@ -55,13 +57,13 @@ impl MeshTree {
         let keys: Vec<&[Vec3]> =
             std::iter::once(mesh.positions.as_slice()).chain(later_positions).collect();
         let tree = Tree::Moving(MovingTree::build(&mesh.triangles, &keys));
-        Self { mesh, later, tree, quality }
+        Self { mesh, later, tangents: None, tree, quality }
     }
 
     /// A mesh which no ray looks for.
     fn elsewhere(mesh: Arc<TriangleMesh>) -> Self {
         let quality = BvhQuality::default();
-        Self { mesh, later: Arc::default(), tree: Tree::Elsewhere, quality }
+        Self { mesh, later: Arc::default(), tangents: None, tree: Tree::Elsewhere, quality }
     }
 
     /// Whether no ray looks for it here.
@@ -113,13 +115,14 @@ impl MeshTree {
         }
     }
 
-    /// Bytes of the tree.
+    /// Bytes of the tree and the tangents.
     pub fn memory(&self) -> usize {
-        match &self.tree {
+        let tree = match &self.tree {
             Tree::Rigid(tree) => tree.memory(),
             Tree::Moving(tree) => tree.memory(),
             Tree::Elsewhere => 0,
-        }
+        };
+        tree + self.tangents.as_ref().map_or(0, |tangents| tangents.memory())
     }
 
     /// The corners of a triangle at `time` in the shutter.
@@ -171,7 +174,8 @@ pub struct MeshTrees {
 }
 
 /// Builds the trees of new meshes and drops those of removed ones. A mesh whose only instance is in
-/// the tree of resting meshes gets none. All are built anew for another quality.
+/// the tree of resting meshes gets none. All are built anew for another quality. Tangents are computed for meshes which a
+/// normal map looks at.
 pub fn rebuild_mesh_trees(
     meshes: Res<Meshes>,
     settings: Res<Settings>,
@@ -181,7 +185,19 @@ pub fn rebuild_mesh_trees(
 ) {
     let quality = settings.0.bvh;
     let outdated = |tree: &Arc<MeshTree>| tree.is_outdated(quality);
-    if !(meshes.is_changed() || resting.is_changed() || trees.list.iter().any(outdated)) {
+    let mut mapped = vec![false; meshes.list.len()];
+    if meshes.is_changed() || instances.is_changed() {
+        for instance in instances.list.iter().filter(|instance| instance.needs.tangents) {
+            if let Geometry::Mesh(mesh) = instance.geometry {
+                mapped[mesh as usize] = true;
+            }
+        }
+    } else {
+        mapped.iter_mut().zip(&trees.list).for_each(|(m, tree)| *m = tree.tangents.is_some());
+    }
+    let remapped = trees.list.iter().zip(&mapped).any(|(tree, m)| tree.tangents.is_some() != *m);
+    let rebuilt = meshes.is_changed() || resting.is_changed() || remapped;
+    if !(rebuilt || trees.list.iter().any(outdated)) {
         if trees.built != 0 {
             trees.bypass_change_detection().built = 0;
         }
@@ -207,14 +223,21 @@ pub fn rebuild_mesh_trees(
             let fits = |tree: &&Arc<MeshTree>| {
                 matches!(tree.tree, Tree::Elsewhere) != wanted[k] && !outdated(tree)
             };
-            match old.iter().filter(same).find(fits) {
+            let (tree, built) = match old.iter().filter(same).find(fits) {
                 Some(tree) => (tree.clone(), false),
                 None if wanted[k] => {
                     let tree = MeshTree::deforming(mesh.clone(), later.clone(), quality);
                     (Arc::new(tree), true)
                 }
                 None => (Arc::new(MeshTree::elsewhere(mesh.clone())), false),
+            };
+            if tree.tangents.is_some() == mapped[k] {
+                return (tree, built);
             }
+            let known = || old.iter().filter(same).find_map(|tree| tree.tangents.clone());
+            let tangents = || known().unwrap_or_else(|| Arc::new(Tangents::new(mesh, later)));
+            let tangents = mapped[k].then(tangents);
+            (Arc::new(MeshTree { tangents, ..Arc::unwrap_or_clone(tree) }), built)
         })
         .collect();
     trees.built = list.iter().filter(|(_, built)| *built).count();

@@ -13,6 +13,7 @@ mod movers;
 mod resting;
 mod spheres;
 mod surface;
+mod tangents;
 #[cfg(test)]
 mod tests;
 mod texture_point;
@@ -24,6 +25,7 @@ pub use geometry::{Hit, SceneGeometry};
 pub use mesh_tree::{MeshTree, MeshTrees, rebuild_mesh_trees};
 pub use resting::{RestingTree, join_resting_meshes};
 pub use surface::SurfacePoint;
+pub use tangents::Tangents;
 pub use top::{TopLevel, rebuild_top_level};
 pub(crate) use tree::Bvh;
 pub use wide::{MovingTree, TriangleHit, WideTree};

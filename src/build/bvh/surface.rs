@@ -161,7 +161,7 @@ impl MeshTree {
 pub(super) struct Facet {
     p: DVec3,
     /// Normal of any positive length.
-    ng: DVec3,
+    pub(super) ng: DVec3,
     e1: DVec3,
     e2: DVec3,
 }
@@ -206,7 +206,7 @@ impl Facet {
 }
 
 /// Texture coordinates of the corners of a triangle; half a square where the mesh has none.
-fn uvs_of(mesh: &TriangleMesh, triangle: u32) -> [DVec2; 3] {
+pub(super) fn uvs_of(mesh: &TriangleMesh, triangle: u32) -> [DVec2; 3] {
     if mesh.uvs.is_empty() {
         [DVec2::ZERO, DVec2::X, DVec2::ONE]
     } else {
@@ -217,7 +217,7 @@ fn uvs_of(mesh: &TriangleMesh, triangle: u32) -> [DVec2; 3] {
 /// The normal between those of the corners, of any length; `None` where there are none, or where
 /// opposite normals cancel.
 #[inline]
-fn interpolated(normals: Option<[DVec3; 3]>, weights: DVec2) -> Option<DVec3> {
+pub(super) fn interpolated(normals: Option<[DVec3; 3]>, weights: DVec2) -> Option<DVec3> {
     let [a, b, c] = normals?;
     let sum = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
     (sum.length_squared() > 0.0).then_some(sum)

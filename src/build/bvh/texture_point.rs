@@ -5,7 +5,7 @@ use super::{Hit, SceneGeometry, SurfacePoint};
 use crate::extract::Geometry;
 use crate::math::{Cone, Frame, Ray};
 use crate::shade::{MaterialTable, Surroundings, TexturePoint, bent_normal};
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// Where nothing says how much of a surface a sample stands for, slopes are measured over this share of the distance
 /// over which u grows by 1: a texel of an image of 1024, to either side.
@@ -80,7 +80,8 @@ impl SceneGeometry<'_> {
         at: &TexturePoint,
     ) {
         let around = || self.surroundings(cone, ray, hit, surface, at);
-        let ns = materials.relief_normal(relief, surface.ns, at, around);
+        let along = || self.tangents(ray, hit, surface);
+        let ns = materials.relief_normal(relief, surface.ns, at, around, along);
         surface.ns = bent_normal(ns, surface.ng, -ray.d);
     }
 
@@ -115,14 +116,28 @@ impl SceneGeometry<'_> {
             let axis = axis.as_dvec3() * step;
             [moved(-axis), moved(axis)]
         });
-        let [dpdu, dpdv] = derivatives.unwrap_or_default();
-        Surroundings {
-            axes: [frame.x, frame.y],
-            step: step as f32,
-            around,
-            dpdu: dpdu.as_vec3(),
-            mirrored: dpdu.cross(dpdv).dot(surface.ng.as_dvec3()) < 0.0,
+        Surroundings { axes: [frame.x, frame.y], step: step as f32, around }
+    }
+
+    /// The tangent and the bitangent of a normal map where a ray hit, in render space, as long as they are where the
+    /// shading normal is 1 long; `None` where uv has no direction.
+    fn tangents(&self, ray: &Ray, hit: &Hit, surface: &SurfacePoint) -> Option<[Vec3; 2]> {
+        let instance = &self.instances[hit.instance as usize];
+        if let Geometry::Mesh(mesh) = &instance.geometry {
+            let tree = &self.meshes[*mesh as usize];
+            let frame = tree.tangent_frame(hit.primitive, hit.weights, ray.time)?;
+            // What it makes of a map is a normal, and goes to render space as normals do.
+            let cofactors = instance.motion.inverse_at(ray.time).matrix3.transpose();
+            let [tangent, bitangent, normal] = frame.map(|axis| cofactors * axis);
+            let unit = normal.length().recip();
+            return Some([tangent, bitangent].map(|axis| (axis * unit).as_vec3()));
         }
+        let [u, v] = self.derivatives(hit, surface, ray.time)?;
+        let (ns, ng) = (surface.ns.as_dvec3(), surface.ng.as_dvec3());
+        let tangent = (u - ns * u.dot(ns)).try_normalize()?;
+        // Where v grows to the right of u, seen from outside, uv is mirrored.
+        let side = u.cross(v).dot(ng).signum();
+        Some([tangent.as_vec3(), (ns.cross(tangent) * side).as_vec3()])
     }
 
     /// `∂p/∂u` and `∂p/∂v` where a ray hit, in render space; `None` where uv does not change in one of

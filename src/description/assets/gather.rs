@@ -3,7 +3,7 @@
 use super::MAX_MESH_ELEMENTS;
 use super::accessor::Source;
 use crate::description::{Rgb, TriangleMesh};
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use gltf::json::Index;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
@@ -38,6 +38,9 @@ impl Gathered {
         let normals = optional::<3>(source, attribute(Semantic::Normals), count, "normals")?;
         let uvs =
             optional::<2>(source, attribute(Semantic::TexCoords(0)), count, "texture coordinates")?;
+        // Without normals they must be ignored (specification, section 3.7.2.1).
+        let tangents = attribute(Semantic::Tangents).filter(|_| normals.is_some());
+        let tangents = optional::<4>(source, tangents, count, "tangents")?;
         let colors = match attribute(Semantic::Colors(0)) {
             Some(colors) => Some(source.colors(colors)?).filter(|colors| colors.len() == count),
             None => None,
@@ -69,8 +72,18 @@ impl Gathered {
         extend(&mut self.mesh.normals, normals, count, orient, Vec3::ZERO);
         // glTF counts v downwards.
         extend(&mut self.mesh.uvs, uvs, count, |[u, v]| Vec2::new(u, 1.0 - v), Vec2::ZERO);
-        extend(&mut self.mesh.colors, colors, count, Rgb::from_array, Rgb::ONE);
         let mirrored = transform.matrix3.determinant() < 0.0;
+        let along = |[x, y, z, sign]: [f32; 4]| {
+            let tangent = transform.transform_vector3(DVec3::new(x.into(), y.into(), z.into()));
+            // A mirror turns the hand of the three axes.
+            let sign = if (sign < 0.0) == mirrored { 1.0 } else { -1.0 };
+            match tangent.try_normalize() {
+                Some(tangent) if tangent.is_finite() => tangent.as_vec3().extend(sign),
+                _ => Vec4::ZERO,
+            }
+        };
+        extend(&mut self.mesh.tangents, tangents, count, along, Vec4::ZERO);
+        extend(&mut self.mesh.colors, colors, count, Rgb::from_array, Rgb::ONE);
         let offset = first as u32;
         self.mesh.triangles.extend(assemble(&indices, mode).map(|[a, b, c]| {
             // A mirror turns fronts into backs; going round the other way turns them again.
@@ -86,6 +99,9 @@ impl Gathered {
         }
         if !self.any_normal {
             self.mesh.normals = Vec::new();
+        }
+        if self.mesh.tangents.iter().all(|tangent| tangent.w == 0.0) {
+            self.mesh.tangents = Vec::new();
         }
         if !self.any_color {
             self.mesh.colors = Vec::new();

@@ -256,7 +256,7 @@ fn percent_decode(uri: &str) -> Option<String> {
 mod tests {
     use super::*;
     use crate::description::assets::{load_mesh, tidy};
-    use glam::{Vec2, Vec3};
+    use glam::{Vec2, Vec3, Vec4};
     use serde_json::json;
     use std::borrow::Cow;
 
@@ -416,6 +416,39 @@ mod tests {
         assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y]);
         let expected = [Vec2::new(0.0, 0.0), Vec2::new(1.0, 1.0), Vec2::new(0.2, 0.6)];
         assert!(mesh.uvs.iter().zip(expected).all(|(&found, e)| found.distance(e) < 1e-6));
+    }
+
+    /// Closed form: the tangents of a file go along with its node; a mirroring one turns their hand. Without normals they
+    /// do not count.
+    #[test]
+    fn tangents_go_along_with_their_node() {
+        let (mut document, mut bytes) = square();
+        let start = bytes.len();
+        bytes.extend(floats(&[0., 0., 1.].repeat(4)));
+        bytes.extend(floats(&[0., 1., 0., -1.].repeat(4)));
+        document["buffers"][0]["byteLength"] = json!(bytes.len());
+        let views = document["bufferViews"].as_array_mut().unwrap();
+        views.push(json!({"buffer": 0, "byteOffset": start, "byteLength": 48}));
+        views.push(json!({"buffer": 0, "byteOffset": start + 48, "byteLength": 64}));
+        let accessors = document["accessors"].as_array_mut().unwrap();
+        accessors.push(json!({"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC3"}));
+        accessors.push(json!({"bufferView": 5, "componentType": 5126, "count": 4, "type": "VEC4"}));
+        let attributes = "/meshes/0/primitives/0/attributes";
+        document.pointer_mut(attributes).unwrap()["TANGENT"] = json!(5);
+        assert!(read(&document, &bytes).unwrap().tangents.is_empty(), "there are no normals");
+        document.pointer_mut(attributes).unwrap()["NORMAL"] = json!(4);
+        for (scale, expected) in [
+            (json!([1, 1, 1]), Vec4::new(0.0, 1.0, 0.0, -1.0)),
+            (json!([3, 3, 3]), Vec4::new(0.0, 1.0, 0.0, -1.0)),
+            (json!([-1, 1, 1]), Vec4::new(0.0, 1.0, 0.0, 1.0)),
+            (json!([1, -2, 1]), Vec4::new(0.0, -1.0, 0.0, 1.0)),
+        ] {
+            document["nodes"][0]["scale"] = scale;
+            assert_eq!(read(&document, &bytes).unwrap().tangents, [expected; 4]);
+        }
+        document["accessors"][5]["count"] = json!(3);
+        let error = read(&document, &bytes).unwrap_err().to_string();
+        assert!(error.contains("3 tangents for 4 positions"), "{error}");
     }
 
     #[test]

@@ -63,6 +63,17 @@ pub enum AssetError {
         path = .path.display()
     )]
     Exr { path: PathBuf, cause: exr::error::Error },
+    #[error(
+        "`{path}` is {width} × {height} pixels; expected at least 1 × 1",
+        path = .path.display()
+    )]
+    NoPixels { path: PathBuf, width: u64, height: u64 },
+    #[error(
+        "`{path}` holds {found} in column {column} of row {row}, counted from the top left from 0, and {count} of its {of} \
+         pixels are not finite; expected finite numbers: repair it in the program that wrote it",
+        path = .path.display()
+    )]
+    Pixel { path: PathBuf, found: String, column: usize, row: usize, count: usize, of: usize },
     #[error("`{path}`, line {line}: {message}", path = .path.display())]
     Obj { path: PathBuf, line: usize, message: String },
     #[error("`{path}`: {message}", path = .path.display())]
@@ -83,6 +94,7 @@ pub enum AssetError {
 /// * Vertex normals have unit length; one which is missing, zero or not finite in a mesh that has
 ///   normals is replaced by the normal of the face. A mesh without any normals stays without.
 /// * `v` grows upwards: glTF, where it grows downwards, is flipped.
+/// * Tangents are read from glTF; one of a vertex whose normal was replaced is left out.
 /// * Triangles of zero area are dropped, and vertices that no triangle uses.
 ///
 /// # Errors

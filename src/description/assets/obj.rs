@@ -2,10 +2,10 @@
 //!
 //! Of the format (Wavefront 1992, *Advanced Visualizer* manual, appendix B1) the statements `v`,
 //! `vt`, `vn` and `f` are read, with negative indices, which count back from the newest, and lines
-//! continued by `\`. Groups, materials, lines, points and free-form surfaces are skipped.
+//! continued by `\`. Colours of vertices after the numbers of a `v` are an extension that tools agree on. Groups, materials, lines, points and free-form surfaces are skipped.
 
 use super::{AssetError, MAX_MESH_ELEMENTS, polygon, too_large};
-use crate::description::TriangleMesh;
+use crate::description::{Rgb, TriangleMesh};
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::Path;
@@ -52,6 +52,8 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<TriangleMesh, AssetErro
 #[derive(Default)]
 struct Reader {
     positions: Vec<Vec3>,
+    /// One for each position; 1 where none is given.
+    colors: Vec<Rgb>,
     uvs: Vec<Vec2>,
     normals: Vec<Vec3>,
     /// Vertices of the mesh by their corner.
@@ -59,6 +61,7 @@ struct Reader {
     mesh: TriangleMesh,
     any_uv: bool,
     any_normal: bool,
+    any_color: bool,
 }
 
 impl Reader {
@@ -66,8 +69,23 @@ impl Reader {
         let mut words = line.split_ascii_whitespace();
         match words.next() {
             Some("v") => {
-                // A fourth number is a weight, used by curves alone; more are colours.
-                self.positions.push(Vec3::from_array(numbers(words, "v x y z")?));
+                let words: Vec<&str> = words.collect();
+                let (place, color) = words.split_at(words.len().min(3));
+                let place = numbers(place.iter().copied(), "v x y z")?;
+                self.positions.push(Vec3::from_array(place));
+                // A single number is a weight, used by curves alone; it may stand before a colour.
+                let color = if color.len() == 4 { &color[1..] } else { color };
+                self.any_color |= color.len() == 3;
+                self.colors.push(match color {
+                    [] | [_] => Rgb::ONE,
+                    [..] if color.len() == 3 => colour(color)?,
+                    _ => {
+                        return Err(format!(
+                            "found {} numbers after `v`, expected `x y z`, perhaps a weight, and perhaps `r g b`",
+                            words.len()
+                        ));
+                    }
+                });
             }
             Some("vt") => {
                 // v may be left out of a one-dimensional texture.
@@ -129,6 +147,7 @@ impl Reader {
             self.any_normal |= normal.is_some();
             let mesh = &mut self.mesh;
             mesh.positions.push(self.positions[position as usize]);
+            mesh.colors.push(self.colors[position as usize]);
             mesh.uvs.push(uv.map_or(Vec2::ZERO, |i| self.uvs[i as usize]));
             mesh.normals.push(normal.map_or(Vec3::ZERO, |i| self.normals[i as usize]));
             mesh.positions.len() as u32 - 1
@@ -141,6 +160,9 @@ impl Reader {
         }
         if !self.any_normal {
             self.mesh.normals = Vec::new();
+        }
+        if !self.any_color {
+            self.mesh.colors = Vec::new();
         }
         self.mesh
     }
@@ -156,6 +178,18 @@ fn resolve(number: &str, count: usize, what: &str) -> Result<u32, String> {
         return Err(format!("found {what} {found}, expected one of the {count} given so far"));
     }
     u32::try_from(index).map_err(|_| format!("{what} {found} is beyond 2³²"))
+}
+
+/// A colour from three words.
+fn colour(words: &[&str]) -> Result<Rgb, String> {
+    let color = Rgb::from_array(numbers(words.iter().copied(), "r g b")?);
+    if color.min_element() < 0.0 || color.max_element() > 1.0 {
+        return Err(format!(
+            "found the colour `{}`, expected linear numbers from 0 to 1: divide those from 0 to 255 by 255",
+            words.join(" ")
+        ));
+    }
+    Ok(color)
 }
 
 fn numbers<'a, const N: usize>(
@@ -216,6 +250,25 @@ f -5/1/2 -1/4/2 2/2/2
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
         assert!(mesh.normals.is_empty() && mesh.uvs.is_empty());
         assert_eq!(mesh.positions[1], Vec3::X);
+    }
+
+    /// Oracle: the numbers of the file. What has none is white, a weight is no colour, and without any there are none.
+    #[test]
+    fn colours_of_vertices_are_read() {
+        let found = mesh("v 0 0 0 0.25 0.5 1\nv 1 0 0\nv 0 1 0 1.0 1 0 0\nf 1 2 3\nf 3 2 1\n");
+        let expected = [Rgb::new(0.25, 0.5, 1.0), Rgb::ONE, Rgb::new(1.0, 0.0, 0.0)];
+        assert_eq!(found.colors, expected);
+        assert!(mesh("v 0 0 0 1\nv 1 0 0\nv 0 1 0 0.5\nf 1 2 3\n").colors.is_empty());
+        for (line, words) in [
+            ("v 0 0 0 1 2", "found 5 numbers"),
+            ("v 0 0 0 1 1 1 1 1", "found 8 numbers"),
+            ("v 0 0 0 255 0 128", "divide those from 0 to 255"),
+            ("v 0 0 0 1 nan 0", "found `nan`"),
+            ("v 0 0 0 1 -0.1 0", "from 0 to 1"),
+        ] {
+            let error = parse(line.as_bytes(), Path::new("m.obj")).unwrap_err().to_string();
+            assert!(error.contains("line 1:") && error.contains(words), "{error}");
+        }
     }
 
     /// An L of area 3 cut wrongly by a fan would cover more.

@@ -2,7 +2,7 @@
 
 use super::{AssetError, MAX_MESH_ELEMENTS, too_large};
 use crate::description::TriangleMesh;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use std::path::Path;
 
 /// Checks a mesh as read and brings it into the form that [`TriangleMesh`] promises.
@@ -47,6 +47,7 @@ fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), AssetError> {
     for (name, length) in [
         ("normals", mesh.normals.len()),
         ("texture coordinates", mesh.uvs.len()),
+        ("tangents", mesh.tangents.len()),
         ("colours", mesh.colors.len()),
     ] {
         if length != 0 && length != vertices {
@@ -100,6 +101,10 @@ fn repair_normals(mesh: &mut TriangleMesh) {
                 if !mesh.uvs.is_empty() {
                     mesh.uvs.push(mesh.uvs[vertex]);
                 }
+                if !mesh.tangents.is_empty() {
+                    // It was given for a normal which is not there.
+                    mesh.tangents.push(Vec4::ZERO);
+                }
                 if !mesh.colors.is_empty() {
                     mesh.colors.push(mesh.colors[vertex]);
                 }
@@ -132,6 +137,7 @@ fn drop_unused(mesh: &mut TriangleMesh) {
     keep(&mut mesh.positions, &used);
     keep(&mut mesh.normals, &used);
     keep(&mut mesh.uvs, &used);
+    keep(&mut mesh.tangents, &used);
     keep(&mut mesh.colors, &used);
 }
 

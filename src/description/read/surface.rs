@@ -419,7 +419,8 @@ pub(super) fn check_triangles(
         }
     }
     let triangles = triangles.iter().map(|&(a, b, c)| [a, b, c]).collect();
-    fine.then_some(TriangleMesh { positions, normals: unit, uvs, colors, triangles })
+    let tangents = Vec::new();
+    fine.then_some(TriangleMesh { positions, normals: unit, uvs, tangents, colors, triangles })
 }
 
 /// Checks a grid; `None` when something in it is wrong.

@@ -6,7 +6,9 @@
 //! not depend on how the surface is parameterised. The gradient is a difference over the footprint of the
 //! sample, so that what is finer than a sample fades.
 //!
-//! A normal map holds the normal itself, in the frame of the surface coordinates.
+//! A normal map holds the normal itself: red along a tangent, green along a bitangent, blue along the shading normal. On
+//! shapes the tangent is the direction in which u grows, on meshes the one that tools agree on
+//! ([`crate::build::bvh::Tangents`]).
 
 use super::MaterialTable;
 use crate::description::Green;
@@ -29,7 +31,7 @@ pub(super) enum Relief {
     },
 }
 
-/// A point of a surface and those around it, as textures see them.
+/// The points around one of a surface, as textures see them.
 #[derive(Clone, Copy, Debug)]
 pub struct Surroundings {
     /// Orthogonal unit vectors in the plane of the shading normal.
@@ -38,26 +40,24 @@ pub struct Surroundings {
     pub step: f32,
     /// The points at `−step` and `+step` along each axis.
     pub around: [[TexturePoint; 2]; 2],
-    /// Direction in which u grows.
-    pub dpdu: Vec3,
-    /// Whether v grows to the right of u, seen from outside: uv is mirrored.
-    pub mirrored: bool,
 }
 
 impl MaterialTable {
     /// The shading normal of a material with a relief where the surface has the unit shading normal `ns`, on the
-    /// same side.
+    /// same side. It asks for the surroundings of the point, or for what red and green of a normal map count along
+    /// there: the tangent and the bitangent.
     pub fn relief_normal(
         &self,
         material: u32,
         ns: Vec3,
         at: &TexturePoint,
         surroundings: impl FnOnce() -> Surroundings,
+        tangents: impl FnOnce() -> Option<[Vec3; 2]>,
     ) -> Vec3 {
         let Some(relief) = self.materials[material as usize].relief else { return ns };
-        let near = surroundings();
         let normal = match relief {
             Relief::Bump { height, strength } => {
+                let near = surroundings();
                 let slope = |axis: usize| {
                     let [before, after] = &near.around[axis];
                     let rise =
@@ -70,9 +70,7 @@ impl MaterialTable {
                 let coded = self.textures.color(map, at) * 2.0 - 1.0;
                 let up = if green == Green::Up { coded.y } else { -coded.y };
                 let across = Vec2::new(coded.x, up) * strength;
-                let tangent = near.dpdu - ns * near.dpdu.dot(ns);
-                let Some(tangent) = tangent.try_normalize() else { return ns };
-                let bitangent = ns.cross(tangent) * if near.mirrored { -1.0 } else { 1.0 };
+                let Some([tangent, bitangent]) = tangents() else { return ns };
                 // Filtered normals are shorter, but never point into the surface.
                 tangent * across.x + bitangent * across.y + ns * coded.z.max(0.0)
             }

@@ -4,8 +4,8 @@
 //! bilinear filter is wrapped by itself, so that a repeating image has no seam. Coordinates are
 //! reduced in `f64`: at uv = 10⁷ an `f32` product with the resolution would have lost the texel.
 
-use super::luminance;
 use super::pyramid::Pyramid;
+use crate::color::luminance;
 use crate::description::{
     Channel, Encoding, ImageData, ImagePixels, Rgb, TextureFilter, TextureFiltering, Wrap,
 };

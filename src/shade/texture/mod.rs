@@ -14,21 +14,16 @@ mod solid;
 pub use point::TexturePoint;
 pub use pyramid::Pyramid;
 
+use crate::color::luminance;
 use crate::description::{ImageData, Rgb, Texture, TextureFiltering, Value};
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
 use pattern::Wall;
 use solid::Octaves;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// A texture as a frame uses it: its pixels shared, other textures by index.
 pub type RenderTexture = Texture<Arc<Pyramid>, u32>;
-
-/// Rec. 709 luminance of a linear colour (Rec. ITU-R BT.709-6, item 3.2, rounded weights).
-#[inline]
-pub(crate) fn luminance(color: Rgb) -> f32 {
-    color.dot(Rgb::new(0.2126, 0.7152, 0.0722))
-}
 
 /// What a texture is asked for: a colour, or a number.
 trait Sample:
@@ -77,13 +72,19 @@ pub struct TextureNeeds {
     pub place: bool,
     /// How much of the surface a sample stands for.
     pub footprint: bool,
+    /// The directions that a normal map was made for.
+    pub tangents: bool,
 }
 
 impl TextureNeeds {
     /// What either needs.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
-        Self { place: self.place || other.place, footprint: self.footprint || other.footprint }
+        Self {
+            place: self.place || other.place,
+            footprint: self.footprint || other.footprint,
+            tangents: self.tangents || other.tangents,
+        }
     }
 }
 
@@ -163,7 +164,8 @@ impl Textures {
                 | Texture::Triplanar { .. }
                 | Texture::VertexColor {}
         );
-        let own = TextureNeeds { place, footprint: self.filtering != TextureFiltering::Point };
+        let footprint = self.filtering != TextureFiltering::Point;
+        let own = TextureNeeds { place, footprint, tangents: false };
         texture.refs().fold(own, |sum, (_, part)| sum.and(self.needs(*part)))
     }
 
@@ -207,8 +209,14 @@ impl Textures {
 
     /// Bytes of all images and their pyramids, each counted once.
     pub fn memory(&self) -> usize {
-        let bytes = |pyramid: &Arc<Pyramid>| pyramid.base.memory() + pyramid.memory();
-        self.pyramids().0.values().map(bytes).sum()
+        let (mut images, mut pyramids, mut bytes) = (HashSet::new(), HashSet::new(), 0);
+        for texture in &self.list {
+            let Texture::Image { file, .. } = texture else { continue };
+            bytes += if pyramids.insert(Arc::as_ptr(file)) { file.memory() } else { 0 };
+            let image = &file.base;
+            bytes += if images.insert(Arc::as_ptr(image)) { image.memory() } else { 0 };
+        }
+        bytes
     }
 
     /// Mean colour of a texture over the unit square: for the power of a textured light. Exact for images and

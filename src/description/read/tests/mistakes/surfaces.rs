@@ -1,0 +1,98 @@
+//! Meshes, water and textures.
+
+use super::super::*;
+
+#[test]
+fn wrong_meshes_are_told() {
+    let text = with_part(
+        r#"meshes: {"tri": Triangles(positions: [(0, 0, 0)], triangles: [(0, 0, 1)],
+           normals: [(0, 0, 0)], uvs: [(0, 0), (1, 1)]), "gone": File("gone.obj")}"#,
+    );
+    insta::assert_snapshot!(mistakes(&text), @r#"
+    error[scene::mesh]: there are only 1 positions, counted from 0
+     --> scene.ron:2:70
+      |
+    2 | meshes: {"tri": Triangles(positions: [(0, 0, 0)], triangles: [(0, 0, 1)],
+      |                                                                      ^ meshes.tri.Triangles.triangles.0.2
+
+    error[scene::out-of-range]: a normal must be a direction other than zero
+     --> scene.ron:3:22
+      |
+    3 |            normals: [(0, 0, 0)], uvs: [(0, 0), (1, 1)]), "gone": File("gone.obj")})
+      |                      ^^^^^^^^^ meshes.tri.Triangles.normals.0
+
+    error[scene::mesh]: `uvs` has 2 entries for 1 positions
+     --> scene.ron:3:39
+      |
+    3 |            normals: [(0, 0, 0)], uvs: [(0, 0), (1, 1)]), "gone": File("gone.obj")})
+      |                                       ^^^^^^^^^^^^^^^^ meshes.tri.Triangles.uvs
+
+    error[scene::missing-file]: the file `gone.obj` does not exist
+     --> scene.ron:3:71
+      |
+    3 |            normals: [(0, 0, 0)], uvs: [(0, 0), (1, 1)]), "gone": File("gone.obj")})
+      |                                                                       ^^^^^^^^^^ meshes.gone.File
+      |
+      = help: files are looked for beside the scene, in `assets/` beside it or beside its folder, and in the asset folders of the command line
+    "#);
+}
+
+#[test]
+fn mistakes_in_water_are_told_with_their_place() {
+    let water = |fields: &str| {
+        let text = with_part(&format!("meshes: {{\"sea\": Waves({fields})}}"));
+        with_settings(&text, &[]).map(|_| ()).expect_err("it is wrong").to_string()
+    };
+    insta::assert_snapshot!(water("size: (3, 0), cells: (0, 10), steepness: 1.5, gravity: -1, waves: []"), @r"
+    scene.ron:2:33: `size` must be at least 1e-12 and at most 1e15 metres, but is 0
+    scene.ron:2:45: `cells` must be at least 1 and at most 65536 cells, but is 0
+    scene.ron:2:64: `steepness` must be at least 0 and at most 1, but is 1.5
+    scene.ron:2:78: `gravity` must be greater than 0 and at most 1000000 metres per second squared, but is -1
+    scene.ron:2:89: `waves` needs 1 to 1024 waves, but has 0
+    ");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0, height: 1)]"), @"scene.ron:2:92: `0` has no field `height`");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0), (frequency: 1)]"), @"scene.ron:2:17: `wave` needs a field `amplitude`");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), waves: [(amplitude: -1, frequency: 0)]"), @r"
+    scene.ron:2:74: `amplitude` must be at least 0 and at most 1e15 metres, but is -1
+    scene.ron:2:89: `frequency` must be greater than 0 and at most 1000000 periods per second, but is 0
+    ");
+    insta::assert_snapshot!(water("size: (3, 2), cells: (65536, 65536), waves: [(amplitude: 1, frequency: 1)]"), @"scene.ron:2:44: a surface has at most 4194304 cells, but this has 4294967296");
+    // a·k = 0.5·(2π)²/9.81 = 2.01
+    insta::assert_snapshot!(water("size: (3, 2), cells: (30, 20), steepness: 0.7, waves: [(amplitude: 0.5, frequency: 1)]"), @"scene.ron:2:77: the surface may fold over itself: `steepness` times the sum of amplitude times wave number is 1.409, and must be at most 1");
+}
+
+#[test]
+fn wrong_textures_and_meshes_made_of_others_are_told() {
+    for (part, messages) in [
+        (
+            r#"textures: {"a": Mix(a: "b"), "b": Placed(of: "a")}"#,
+            &["the texture `b` is made of itself: `a` → `b` → `a`", "textures.b.Placed.of"][..],
+        ),
+        (
+            r#"textures: {"n": Noise(octaves: 99, size: -1), "r": Remap(of: "x", from: (1, 1))}"#,
+            &[
+                "`octaves` must be at least 1 and at most 32",
+                "textures.n.Noise.size",
+                "there is no texture named `x`",
+                "`from` must be two different numbers, but both are 1",
+            ][..],
+        ),
+        (
+            r#"meshes: {"s": Subdivided(of: "s", levels: 3)}"#,
+            &["the mesh `s` is made from itself", "meshes.s.Subdivided.of"][..],
+        ),
+        (
+            r#"meshes: {"g": Grid(size: (1, 1), cells: (2, 2)), "big": Subdivided(of: "g", levels: 40)}"#,
+            &["a mesh has at most 67108864 triangles", "meshes.big.Subdivided.levels"][..],
+        ),
+        (
+            r#"meshes: {"g": Grid(size: (1, 1), cells: (2, 2)), "d": Displaced(of: "g", height: "no")}"#,
+            &["there is no texture named `no`", "meshes.d.Displaced.height"][..],
+        ),
+    ] {
+        let told = mistakes(&with_part(part));
+        for message in messages {
+            assert!(told.contains(message), "{part}: {told}");
+        }
+    }
+}
