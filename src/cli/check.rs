@@ -44,6 +44,10 @@ fn requirements(survey: &Survey) -> Vec<(&'static str, String)> {
         count => vec![("requires", format!("{} {seen}", format::plural(count, "feature")))],
     };
     lines.extend(survey.features.iter().map(|(name, why)| ("", format!("  {name}: {why}"))));
+    lines.extend(survey.diced.iter().map(|(name, triangles, bytes)| {
+        let (triangles, bytes) = (format::count(*triangles as f64), format::bytes(*bytes as u64));
+        ("diced", format!("`{name}` to {triangles} triangles for the camera, {bytes}"))
+    }));
     lines.push(("integrator", survey.integrator.clone()));
     lines
 }

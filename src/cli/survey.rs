@@ -1,9 +1,11 @@
 //! What a scene requires, found by preparing some of its frames without rendering them.
 
 use super::failure::Failure;
+use bevy_ecs::prelude::With;
 use kinora::description::{Diagnostics, SceneDescription};
-use kinora::extract::Requirements;
+use kinora::extract::{Displaced, Requirements};
 use kinora::frame::Simulation;
+use kinora::world::{Name, Views};
 
 /// What was found at the frames looked at.
 pub struct Survey {
@@ -13,6 +15,8 @@ pub struct Survey {
     pub features: Vec<(String, String)>,
     /// The integrator that will run, and why.
     pub integrator: String,
+    /// Meshes that are divided for the camera: their names, triangles and bytes.
+    pub diced: Vec<(String, usize, usize)>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -37,8 +41,21 @@ impl Survey {
             }
         }
         let features = union(&frames, found);
-        Ok(Self { frames, features, integrator: simulation.integrator(), warnings })
+        let (diced, integrator) = (diced(&mut simulation), simulation.integrator());
+        Ok(Self { frames, features, integrator, diced, warnings })
     }
+}
+
+/// What was divided for the camera, in the order of the names.
+fn diced(simulation: &mut Simulation) -> Vec<(String, usize, usize)> {
+    let world = simulation.world_mut();
+    let mut diced = world.query_filtered::<(&Name, &Displaced), With<Views>>();
+    let told = |(name, displaced): (&Name, &Displaced)| {
+        (name.as_str().to_owned(), displaced.mesh.triangles.len(), displaced.memory())
+    };
+    let mut diced: Vec<_> = diced.iter(world).map(told).collect();
+    diced.sort();
+    diced
 }
 
 /// Each feature once, with its first reason, and with the frame where it is not required at all of
@@ -111,6 +128,25 @@ mod tests {
         let motion = &found.features[1].1;
         assert!(motion.contains("`ball`") && motion.ends_with("(frame 12)"), "{motion}");
         assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    }
+
+    /// Closed form: an edge of 1 m at 2 m, where a pixel of 100 in 90° is at least 2·2/100/√3 m.
+    #[test]
+    fn what_is_diced_is_counted() {
+        let found = survey(
+            r#"(render: (size: (100, 100), dicing: 44), textures: {"t": Gradient()},
+            meshes: {"flat": Grid(size: (1, 1), cells: (1, 1)),
+                "fine": Displaced(of: "flat", height: "t", strength: 0, adaptive: true),
+                "coarse": Displaced(of: "flat", height: "t", strength: 0)},
+            entities: {
+                "eye": (transform: (translation: (0, 0, 2)), camera: (fov: 90)),
+                "one": (shape: Mesh("fine")), "two": (shape: Mesh("coarse")),
+                "sky": (light: Sky(radiance: 1))})"#,
+        );
+        // The sides span 41 pixels, the diagonal 58: it is divided, its halves are not.
+        let names: Vec<_> =
+            found.diced.iter().map(|(name, triangles, _)| (name.as_str(), *triangles)).collect();
+        assert_eq!(names, [("fine", 4)]);
     }
 
     #[test]

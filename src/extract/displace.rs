@@ -22,6 +22,13 @@ pub struct Displaced {
     pub bounds: Aabb,
 }
 
+impl Displaced {
+    /// Bytes that the mesh took while it was made, by which `dicing_memory` is counted.
+    pub fn memory(&self) -> usize {
+        bytes_of(self.mesh.triangles.len(), self.mesh.positions.len())
+    }
+}
+
 /// Why a mesh was not diced.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq)]
 pub struct DicingRefused(pub Option<Refusal>);

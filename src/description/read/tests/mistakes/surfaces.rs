@@ -96,3 +96,72 @@ fn wrong_textures_and_meshes_made_of_others_are_told() {
         }
     }
 }
+
+/// What is wrong with a displacement says so where it is.
+#[test]
+fn displacements_say_what_is_missing() {
+    let with = |fields: &str| {
+        format!(
+            r#"textures: {{"t": Checker()}}, meshes: {{"g": Grid(size: (1, 1), cells: (2, 2)), "d": Displaced(of: "g"{fields})}}"#
+        )
+    };
+    for (fields, message) in [
+        ("", "give it a `height` or an `offset`"),
+        (r#", height: "t", offset: "t""#, "`height` and `offset` exclude each other"),
+        (r#", offset: "no""#, "there is no texture named `no`"),
+        (r#", offset: "t", space: World"#, "`World`"),
+        (r#", height: "t", strength: inf"#, "strength"),
+    ] {
+        let told = mistakes(&with_part(&with(fields)));
+        assert!(told.contains(message) && told.contains("meshes.d"), "{fields}: {told}");
+    }
+    for (setting, message) in [("dicing", "`dicing`"), ("dicing_memory", "`dicing_memory`")] {
+        let told = with_settings(&with_part(""), &[(&format!("render.{setting}"), "0")]);
+        let told = told.expect_err("nothing is 0 pixels long").render(false);
+        assert!(told.contains(message), "{told}");
+    }
+}
+
+/// Patches of wrong numbers: each is told at its place, and none makes a panic or a mesh without end.
+#[test]
+fn patches_say_what_does_not_fit() {
+    let point = |k: usize| format!("({}, {}, 0)", k % 4, k / 4);
+    let points = (0..16).map(point).collect::<Vec<_>>().join(", ");
+    let bezier = |fields: &str| format!("Patches(points: [{points}], {fields})");
+    let all = "patches: [[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]]";
+    let rows = (0..4)
+        .map(|v| format!("[{}]", (0..4).map(|u| point(4 * v + u)).collect::<Vec<_>>().join(", ")));
+    let rows = rows.collect::<Vec<_>>().join(", ");
+    let spline = |fields: &str| format!("Spline(rows: [{rows}], {fields})");
+    let same = "(1, 1, 1), ".repeat(16);
+    for (mesh, message) in [
+        (bezier(all), "tolerance"),
+        (bezier(&format!("{all}, tolerance: 0")), "tolerance"),
+        (bezier("patches: [], tolerance: 1"), "at least one"),
+        (bezier("patches: [[0, 1, 2]], tolerance: 1"), "not 3"),
+        (bezier(&all.replace("15]", "16]")).replace("]])", "]], tolerance: 1)"), "only 16 points"),
+        (bezier(&format!("{all}, tolerance: 1, weights: [1, 2]")), "one weight for each point"),
+        (format!("Patches(points: [{same}], {all}, tolerance: 1)"), "no surface comes of these"),
+        (
+            format!(
+                "Patches(points: [{}], {all}, tolerance: 1)",
+                points.replacen("(0,", "(NaN,", 1)
+            ),
+            "`NaN` is not a finite number",
+        ),
+        (spline("tolerance: 1, weights: [[1, 1, 1, -1]]"), "weights"),
+        (spline("tolerance: 1, knots_u: [0, 0, 0, 0, 1]"), "knots"),
+        (spline("tolerance: 1, knots_u: [0, 0, 0, 0, 1, 1, 1, 0.5]"), "less than the one before"),
+        (spline("tolerance: 1, closed: (true, false), knots_u: [0]"), "leave out `knots_u`"),
+        ("Spline(rows: [[(0, 0, 0)]], tolerance: 1)".to_owned(), "at least 4 rows"),
+        (spline("tolerance: 1").replacen("(0, 0, 0), ", "", 1), "at least 4 rows"),
+    ] {
+        let told = mistakes(&with_part(&format!(r#"meshes: {{"m": {mesh}}}"#)));
+        assert!(told.contains(message) && told.contains("meshes.m"), "{mesh}: {told}");
+    }
+    // Beyond what a mesh may be, whatever the numbers.
+    let bent = points.replacen("(1, 1, 0)", "(1, 1, 9000000)", 1);
+    let mesh = format!("Patches(points: [{bent}], {all}, tolerance: 1e-9)");
+    let told = mistakes(&with_part(&format!(r#"meshes: {{"m": {mesh}}}"#)));
+    assert!(told.contains("at most 67108864 triangles"), "{told}");
+}
