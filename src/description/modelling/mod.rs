@@ -1,15 +1,19 @@
 //! Meshes made from other meshes and from numbers.
 
 mod dice;
+mod extrude;
 mod grid;
 mod patches;
 mod subdivide;
+mod text;
 mod weld;
 
 pub use dice::{TooFine, View, divided_where_long, longest_span, perspective_pixel};
+pub use extrude::{Filling, extruded, flattened};
 pub use grid::grid;
 pub use patches::{Patch, Placed, Run, cells_for, patch_mesh, spline_patches};
 pub use subdivide::{Subdivision, subdivided};
+pub use text::{Alignment, TextError, text_contours};
 pub use weld::{Weld, smooth_normals};
 
 /// What the tests of made meshes share.

@@ -1,6 +1,7 @@
 //! The definitions of all files of a scene, gathered by name and read one by one.
 
 use super::decode::{Report, decode, decode_fields};
+use super::extrude;
 use super::files;
 use super::limits;
 use super::outline::Kind;
@@ -495,6 +496,15 @@ impl Assets<'_> {
                     cursor, positions, &triangles, normals, uvs, colors, report,
                 )
                 .map(Arc::new)
+            }
+            MeshFile::Extrusion { outline, depth, tolerance, smooth } => {
+                let drawn = (depth, tolerance, smooth);
+                extrude::extrusion(cursor, &outline, drawn, report).map(Arc::new)
+            }
+            MeshFile::Text { text, font, size, depth, tolerance, smooth, align } => {
+                let path = self.find(&cursor.at("font"), &font, scene, report)?;
+                let (words, drawn) = ((&text[..], size, align), (depth, tolerance, smooth));
+                extrude::words(cursor, words, &path, drawn, report).map(Arc::new)
             }
             MeshFile::Patches { points, weights, patches, tolerance } => {
                 let net = (&points[..], weights);

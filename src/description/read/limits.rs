@@ -38,6 +38,8 @@ pub(super) const ANGLE: Limits = closed(-1e9, 1e9, "degrees");
 pub(super) const SCALE: Limits = closed(-1e12, 1e12, "");
 /// Weights of the points of a curve; only their ratios count.
 pub(super) const WEIGHT: Limits = closed(1e-6, 1e6, "");
+/// From which angle surfaces meet in an edge.
+pub(super) const CREASE: Limits = closed(0.0, 180.0, "degrees");
 /// Directions; only their direction counts.
 pub(super) const DIRECTION: Limits = closed(-1e15, 1e15, "");
 /// Times of keys.

@@ -12,6 +12,7 @@
 mod assemble;
 mod decode;
 mod entity;
+mod extrude;
 mod files;
 mod limits;
 mod motion;

@@ -7,9 +7,10 @@ use super::profile::read_revolution;
 use super::source::Cursor;
 use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
+use crate::description::modelling::Alignment;
 use crate::description::modelling::Subdivision;
 use crate::description::{
-    Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb, Shape, Texture,
+    Curve, Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb, Shape, Texture,
     TriangleMesh, Value, Wave,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
@@ -58,6 +59,26 @@ pub(super) enum MeshFile {
         #[serde(default)]
         adaptive: bool,
     },
+    /// A plane figure drawn out.
+    Extrusion {
+        outline: Vec<Curve>,
+        depth: f64,
+        tolerance: f64,
+        #[serde(default = "crease")]
+        smooth: f64,
+    },
+    /// Words drawn out.
+    Text {
+        text: String,
+        font: String,
+        size: f64,
+        depth: f64,
+        tolerance: f64,
+        #[serde(default = "crease")]
+        smooth: f64,
+        #[serde(default)]
+        align: Alignment,
+    },
     /// Bicubic Bézier patches.
     Patches {
         points: Vec<DVec3>,
@@ -99,6 +120,11 @@ pub(super) enum OffsetSpace {
     Tangent,
     /// x, y and z of the mesh.
     Object,
+}
+
+/// From which angle walls meet in an edge, degrees.
+fn crease() -> f64 {
+    30.0
 }
 
 /// The usual strength of a displacement, metres.

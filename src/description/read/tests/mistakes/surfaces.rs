@@ -165,3 +165,31 @@ fn patches_say_what_does_not_fit() {
     let told = mistakes(&with_part(&format!(r#"meshes: {{"m": {mesh}}}"#)));
     assert!(told.contains("at most 67108864 triangles"), "{told}");
 }
+
+/// What is wrong with an outline or a text says so where it is.
+#[test]
+fn extrusions_say_what_is_wrong() {
+    let ring = "Lines(points: [(0, 0), (1, 0), (1, 1)])";
+    let drawn = |outline: &str, rest: &str| format!("Extrusion(outline: [{outline}], {rest})");
+    for (mesh, message) in [
+        (drawn(ring, "depth: 0, tolerance: 1"), "depth"),
+        (drawn(ring, "depth: 1, tolerance: -1"), "tolerance"),
+        (drawn(ring, "depth: 1"), "tolerance"),
+        (drawn(ring, "depth: 1, tolerance: 1, smooth: 200"), "smooth"),
+        (drawn("", "depth: 1, tolerance: 1"), "goes around nothing"),
+        (drawn("Lines(points: [(0, 0), (1, 0)])", "depth: 1, tolerance: 1"), "goes around nothing"),
+        (drawn("Lines(points: [(0, 0)])", "depth: 1, tolerance: 1"), "2 points"),
+        (drawn("Lines(points: [(NaN, 0), (1, 0)])", "depth: 1, tolerance: 1"), "not a finite"),
+        (
+            drawn("Bezier(points: [(0, 0), (1, 0), (1, 1)])", "depth: 1, tolerance: 1"),
+            "3·n + 1 points",
+        ),
+        (
+            r#"Text(text: "a", font: "none.ttf", size: 1, depth: 1, tolerance: 1)"#.to_owned(),
+            "none.ttf",
+        ),
+    ] {
+        let told = mistakes(&with_part(&format!(r#"meshes: {{"m": {mesh}}}"#)));
+        assert!(told.contains(message) && told.contains("meshes.m"), "{mesh}: {told}");
+    }
+}
