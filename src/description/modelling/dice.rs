@@ -90,9 +90,8 @@ pub fn divided_where_long(
         return Err(TooFine { triangles });
     }
     let first = mesh.positions.len() as u32;
-    let middle = |edge: [u32; 2]| {
-        first + edges.binary_search(&edge).expect("every long edge was gathered") as u32
-    };
+    // Every long edge was gathered, so that the place is that of the edge.
+    let middle = |edge: [u32; 2]| first + edges.partition_point(|before| *before < edge) as u32;
     let mut fine = TriangleMesh {
         positions: extended(&mesh.positions, &edges, |_, _, edge| halfway(mesh, edge)),
         normals: extended(&mesh.normals, &edges, |a, b, _| (a + b).normalize_or(a)),

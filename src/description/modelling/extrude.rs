@@ -43,7 +43,9 @@ pub fn flattened(curves: &[Cubic], tolerance: f64) -> Vec<DVec2> {
     /// Chords of a curve at most, as a power of two.
     const MOST: u32 = 20;
     let mut points = Vec::new();
-    curves.iter().for_each(|curve| flatten(curve, tolerance, MOST, &mut points));
+    for curve in curves {
+        flatten(curve, tolerance, MOST, &mut points);
+    }
     points
 }
 

@@ -253,14 +253,12 @@ pub fn spline_patches(net: &[Vec<DVec4>], [along_u, along_v]: &[Run; 2]) -> Vec<
             along_v.curves(&points)
         });
         let strips = runs[0].len();
-        for strip in 0..strips {
-            let patch = [0, 1, 2, 3].map(|v| [0, 1, 2, 3].map(|u: usize| runs[u][strip][v]));
-            let corner = |i: usize, j: usize| {
-                DVec2::new(i as f64 / columns as f64, j as f64 / strips as f64)
-            };
-            let uv = [corner(column, strip), corner(column + 1, strip + 1)];
-            patches.push((Patch(patch), uv));
-        }
+        let corner =
+            |i: usize, j: usize| DVec2::new(i as f64 / columns as f64, j as f64 / strips as f64);
+        patches.extend((0..strips).map(|strip| {
+            let patch = [0, 1, 2, 3].map(|v: usize| [0, 1, 2, 3].map(|u: usize| runs[u][strip][v]));
+            (Patch(patch), [corner(column, strip), corner(column + 1, strip + 1)])
+        }));
     }
     patches
 }
