@@ -221,9 +221,7 @@ fn wall(contour: &[DVec2], depth: f64, smooth_cos: f64, mesh: &mut TriangleMesh)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::modelling::Weld;
-    use crate::description::modelling::solids::volume;
-    use std::collections::HashMap;
+    use crate::description::modelling::solids::{assert_closed, volume};
     use std::f64::consts::PI;
 
     fn square(centre: DVec2, half: f64) -> Vec<DVec2> {
@@ -241,21 +239,6 @@ mod tests {
             Cubic::new(quarter.map(spin), [1.0, w, w, 1.0])
         };
         flattened(&[0, 1, 2, 3].map(turned), tolerance)
-    }
-
-    /// Every edge is passed as often one way as the other. Where two corners touch there are four walls at an edge.
-    fn assert_closed(mesh: &TriangleMesh) {
-        let weld = Weld::new(mesh);
-        let mut passed: HashMap<[u32; 2], i32> = HashMap::new();
-        for &triangle in &mesh.triangles {
-            let [a, b, c] = weld.corners(triangle);
-            for edge in [[a, b], [b, c], [c, a]] {
-                *passed.entry(edge).or_default() += 1;
-            }
-        }
-        for (&[a, b], count) in &passed {
-            assert_eq!(passed.get(&[b, a]), Some(count), "an edge is open");
-        }
     }
 
     /// Closed forms: the volume of a plate with holes, whichever way its contours run; of a bow tie, whose contour crosses

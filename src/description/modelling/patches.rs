@@ -266,8 +266,7 @@ pub fn spline_patches(net: &[Vec<DVec4>], [along_u, along_v]: &[Run; 2]) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::modelling::solids::volume;
-    use std::collections::HashSet;
+    use crate::description::modelling::solids::{assert_closed, volume, ways};
     use std::f64::consts::PI;
 
     const UNIT: [DVec2; 2] = [DVec2::ZERO, DVec2::ONE];
@@ -298,19 +297,6 @@ mod tests {
             patches.push((Patch(patch), UNIT));
         }
         patches
-    }
-
-    /// Each edge lies between two triangles which pass it in opposite ways.
-    fn assert_closed(mesh: &TriangleMesh) {
-        let weld = Weld::new(mesh);
-        let mut passed = HashSet::new();
-        for &triangle in &mesh.triangles {
-            let [a, b, c] = weld.corners(triangle);
-            for edge in [[a, b], [b, c], [c, a]] {
-                assert!(passed.insert(edge), "two triangles on one side of an edge");
-            }
-        }
-        assert!(passed.iter().all(|&[a, b]| passed.contains(&[b, a])), "an edge is open");
     }
 
     /// How far the middles and edges of the triangles are from where `distance` is 0.
@@ -405,13 +391,8 @@ mod tests {
         assert_eq!(patches.len(), 8);
         let tube = patch_mesh(&patches, 4);
         // By its places it is a tube: of its edges only those at both ends have one triangle.
-        let weld = Weld::new(&tube);
-        let mut passed = HashSet::new();
-        for &triangle in &tube.triangles {
-            let [a, b, c] = weld.corners(triangle);
-            passed.extend([[a, b], [b, c], [c, a]]);
-        }
-        let open: Vec<_> = passed.iter().filter(|&&[a, b]| !passed.contains(&[b, a])).collect();
+        let ways = ways(&tube);
+        let open: Vec<_> = ways.keys().filter(|&&[a, b]| !ways.contains_key(&[b, a])).collect();
         assert_eq!(open.len(), 2 * 8 * 4);
         for n in tube.normals.iter().zip(&tube.positions) {
             assert!(n.0.dot(Vec3::new(n.1.x, 0.0, n.1.z).normalize()) > 0.99, "outwards");
