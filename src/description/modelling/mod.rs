@@ -5,6 +5,7 @@ mod extrude;
 mod grid;
 mod patches;
 mod subdivide;
+mod tessellate;
 mod text;
 mod weld;
 
@@ -13,6 +14,7 @@ pub use extrude::{Filling, extruded, flattened};
 pub use grid::grid;
 pub use patches::{Patch, Placed, Run, cells_for, patch_mesh, spline_patches};
 pub use subdivide::{Subdivision, subdivided};
+pub use tessellate::{TessellationError, tessellated};
 pub use text::{Alignment, TextError, text_contours};
 pub use weld::{Weld, smooth_normals};
 

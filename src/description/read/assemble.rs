@@ -514,6 +514,9 @@ impl Assets<'_> {
                 let (net, knots) = ((&rows[..], &weights[..]), (knots_u, knots_v));
                 spline_mesh(cursor, net, knots, closed, tolerance, report).map(Arc::new)
             }
+            MeshFile::Tessellated { tolerance, .. } => {
+                surface::tessellation(cursor, tolerance, names, report).map(Arc::new)
+            }
             MeshFile::Waves { size, cells, waves, steepness, gravity } => {
                 let waves = Waves { size, cells, steepness, gravity, waves };
                 let waves = check_waves(cursor, waves, report)?;

@@ -7,8 +7,7 @@ use super::profile::read_revolution;
 use super::source::Cursor;
 use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
-use crate::description::modelling::Alignment;
-use crate::description::modelling::Subdivision;
+use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
 use crate::description::{
     Curve, Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb, Shape, Texture,
     TriangleMesh, Value, Wave,
@@ -16,6 +15,7 @@ use crate::description::{
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 /// A mesh as a scene file says it.
 #[derive(Debug, Deserialize)]
@@ -98,6 +98,12 @@ pub(super) enum MeshFile {
         knots_v: Vec<f64>,
         #[serde(default)]
         closed: (bool, bool),
+        tolerance: f64,
+    },
+    /// An analytic shape, which is read by itself.
+    Tessellated {
+        #[serde(rename = "shape")]
+        _shape: IgnoredAny,
         tolerance: f64,
     },
     /// The moving surface of water.
@@ -464,6 +470,31 @@ pub(super) fn check_grid(
         fine = check_triangle_count(&place, 2.0 * cells[0] * cells[1], report);
     }
     fine.then_some(())
+}
+
+/// The mesh of an analytic shape.
+pub(super) fn tessellation(
+    cursor: &Cursor,
+    tolerance: f64,
+    names: &Names,
+    report: &mut Report,
+) -> Option<TriangleMesh> {
+    let place = cursor.field("shape")?;
+    let shape = read_shape(&place, names, report)?;
+    if !limits::number(report, &cursor.at("tolerance"), tolerance, &limits::LENGTH) {
+        return None;
+    }
+    match tessellated(&shape, tolerance, MAX_MESH_ELEMENTS as f64) {
+        Ok(mesh) => Some(mesh),
+        Err(TessellationError::TooFine(triangles)) => {
+            check_triangle_count(&cursor.at("tolerance"), triangles.ceil(), report);
+            None
+        }
+        Err(error @ TessellationError::NoSuchShape) => {
+            report.at("scene::mesh", &place, error.to_string());
+            None
+        }
+    }
 }
 
 /// Checks how finely a mesh is divided.

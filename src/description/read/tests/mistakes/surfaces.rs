@@ -166,6 +166,25 @@ fn patches_say_what_does_not_fit() {
     assert!(told.contains("at most 67108864 triangles"), "{told}");
 }
 
+/// A shape which becomes a mesh: what is wrong with it, or with how closely it is followed.
+#[test]
+fn tessellations_say_what_is_wrong() {
+    for (fields, message) in [
+        ("shape: Sphere(radius: 1)", "tolerance"),
+        ("tolerance: 1", "shape"),
+        ("shape: Sphere(radius: 1), tolerance: -1", "tolerance"),
+        ("shape: Sphere(radius: NaN), tolerance: 1", "`NaN` is not a finite number"),
+        ("shape: Spere(radius: 1), tolerance: 1", "`Sphere`"),
+        ("shape: Plane(), tolerance: 1", "shapes with an end"),
+        ("shape: Mesh(\"m\"), tolerance: 1", "no meshes"),
+        ("shape: Sphere(radius: 1e6), tolerance: 1e-9", "at most 67108864 triangles"),
+        ("shape: Revolution(profile: \"vase\"), tolerance: 1", "there is no profile named `vase`"),
+    ] {
+        let told = mistakes(&with_part(&format!(r#"meshes: {{"m": Tessellated({fields})}}"#)));
+        assert!(told.contains(message) && told.contains("meshes.m"), "{fields}: {told}");
+    }
+}
+
 /// What is wrong with an outline or a text says so where it is.
 #[test]
 fn extrusions_say_what_is_wrong() {
