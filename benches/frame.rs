@@ -113,6 +113,7 @@ fn spheres(material: Material, lace: bool) -> Simulation {
 fn features(c: &mut Criterion) {
     let glass = |attenuation| Material::Dielectric {
         ior: 1.5,
+        dispersion: None,
         roughness: 0.0.into(),
         attenuation,
         priority: 0,

@@ -27,6 +27,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
     };
     let glass = |roughness: f32| Material::Dielectric {
         ior: 1.5,
+        dispersion: None,
         roughness: roughness.into(),
         attenuation: None,
         priority: 0,

@@ -42,7 +42,8 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
 
 /// Whether solids may overlap in this frame.
 fn solids_nest(requirements: Res<crate::extract::Requirements>) -> bool {
-    requirements.has(crate::extract::Feature::NestedDielectrics)
+    use crate::extract::Feature;
+    requirements.has(Feature::NestedDielectrics) || requirements.has(Feature::Dispersion)
 }
 
 /// Whether the integrator of this frame works with photons.

@@ -15,8 +15,11 @@
 //! right for water whose only surface is that on top, if nothing else lies between.
 
 use super::bvh::{Hit, MeshTree, MeshTrees, SceneGeometry, SurfacePoint};
+use crate::color::wavelength::{self, DrawnWavelength};
+use crate::description::Rgb;
 use crate::extract::{Geometry, Instances, NOTHING, Surfaces, overlapping_pairs, solids};
 use crate::math::{Aabb, Ray, offset_ray_origin};
+use crate::sampling::Sampler;
 use crate::shade::MaterialTable;
 use crate::shade::nesting::{Inside, NestingFaults, Solid, SolidStack};
 use bevy_ecs::prelude::*;
@@ -108,12 +111,12 @@ impl NestedGeometry<'_> {
         if !I::ABSORBS {
             return plain(*inside);
         }
-        if let Some(&stack) = inside.stack() {
+        if inside.stack().is_some() {
             return match self.solids.places.get(hit.instance as usize) {
                 Some(&place) if place != NOTHING => {
                     let (before, meeting) =
-                        self.meet_solid(ray, place, hit, surface, stack, faults);
-                    *inside = I::new(&before);
+                        self.meet_solid(ray, place, hit, surface, inside, faults);
+                    *inside = inside.within(&before);
                     meeting
                 }
                 _ => plain(*inside),
@@ -133,9 +136,10 @@ impl NestedGeometry<'_> {
         place: u32,
         hit: Hit,
         surface: SurfacePoint,
-        stack: SolidStack,
+        inside: &I,
         faults: &mut NestingFaults,
     ) -> (SolidStack, Meeting<I>) {
+        let stack = inside.stack().copied().unwrap_or_default();
         let entry = &self.solids.list[place as usize];
         let entering = ray.d.dot(surface.ng) < 0.0;
         let mut crossings =
@@ -169,7 +173,7 @@ impl NestedGeometry<'_> {
             let crossing = crossings.iter().find(|c| c.solid.instance == owner.instance)?;
             Some((crossing, outside.map(|solid| solid.material)))
         });
-        let beyond = I::new(&beyond);
+        let beyond = inside.within(&beyond);
         let meeting = match owner {
             Some((&Crossing { hit, surface, .. }, outside)) => {
                 Meeting::Surface { hit, surface, beyond, outside }
@@ -222,6 +226,28 @@ impl NestedGeometry<'_> {
 
     fn has_holes(&self, hit: &Hit) -> bool {
         self.materials.has_opacity(self.geometry.instances[hit.instance as usize].material)
+    }
+
+    /// Draws the wavelength of a path where it first meets a surface at which the wavelength matters: of a material, with
+    /// what is on its outside. Returns what the path then counts; the path is told on both sides.
+    #[inline]
+    pub fn disperse<I: Inside>(
+        &self,
+        (material, outside): (u32, Option<u32>),
+        [here, beyond]: [&mut I; 2],
+        sampler: &Sampler,
+        dimension: u32,
+    ) -> Rgb {
+        if !I::DISPERSES || material == NOTHING || here.wavelength().is_some() {
+            return Rgb::ONE;
+        }
+        let disperses = |material| self.materials.disperses(material);
+        if !(disperses(material) || outside.is_some_and(disperses)) {
+            return Rgb::ONE;
+        }
+        let DrawnWavelength { nm, weight } = wavelength::draw(sampler.one(dimension));
+        (*here, *beyond) = (here.tuned(nm), beyond.tuned(nm));
+        weight
     }
 
     /// The solids around a point.

@@ -5,6 +5,7 @@
 
 pub mod srgb;
 pub mod tone;
+pub mod wavelength;
 
 use glam::Vec3;
 

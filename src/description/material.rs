@@ -1,6 +1,6 @@
 //! What surfaces are made of, as a scene file says it.
 
-use super::{Rgb, Value};
+use super::{Dispersion, Rgb, Value};
 use serde::Deserialize;
 
 /// A surface material. `R` refers to textures and to other materials.
@@ -27,9 +27,13 @@ pub enum Material<R> {
     },
     /// A solid of clear glass, water, crystal: the shape must enclose a volume.
     Dielectric {
-        /// Index of refraction relative to vacuum.
+        /// Index of refraction relative to vacuum, at the d line where there is dispersion; that counts which says the
+        /// index itself.
         #[serde(default = "glass_ior")]
         ior: f32,
+        /// How the index depends on the wavelength; `None`: not at all.
+        #[serde(default)]
+        dispersion: Option<Dispersion>,
         /// Perceptual roughness of the interface.
         #[serde(default = "smooth")]
         roughness: Value<f32, R>,
@@ -201,12 +205,15 @@ impl<R> Material<R> {
             Self::Mirror { reflectance } => {
                 Material::Mirror { reflectance: reflectance.map_ref(textures)? }
             }
-            Self::Dielectric { ior, roughness, attenuation, priority } => Material::Dielectric {
-                ior,
-                roughness: roughness.map_ref(textures)?,
-                attenuation,
-                priority,
-            },
+            Self::Dielectric { ior, dispersion, roughness, attenuation, priority } => {
+                Material::Dielectric {
+                    ior,
+                    dispersion,
+                    roughness: roughness.map_ref(textures)?,
+                    attenuation,
+                    priority,
+                }
+            }
             Self::ThinGlass { ior, tint } => {
                 Material::ThinGlass { ior, tint: tint.map_ref(textures)? }
             }

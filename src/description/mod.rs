@@ -3,6 +3,7 @@
 pub mod assets;
 mod camera;
 mod diagnostic;
+mod dispersion;
 mod light;
 mod material;
 pub mod modelling;
@@ -19,6 +20,7 @@ mod waves;
 
 pub use camera::{Camera, Focus, SENSOR_HEIGHT};
 pub use diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
+pub use dispersion::{D_LINE, Dispersion, DispersionError, IndexCurve, index_at_d};
 pub use light::{Emission, EmissionStrength, Light};
 pub use material::{Attenuation, Green, Material, Metal};
 pub use motion::{

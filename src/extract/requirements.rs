@@ -28,6 +28,8 @@ pub enum Feature {
     /// Solids which may overlap, or absorb around the camera or a light: rays must know all that they
     /// are inside of.
     NestedDielectrics,
+    /// Solids whose index of refraction depends on the wavelength: paths must know theirs, and what they are inside of.
+    Dispersion,
     /// Light from all around.
     Sky,
     /// Light which reaches diffuse surfaces through mirrors or glass.
@@ -54,6 +56,7 @@ pub struct Census {
     masked: usize,
     absorbing: usize,
     solid: usize,
+    dispersive: usize,
     /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
     storable: usize,
@@ -74,6 +77,7 @@ impl Census {
             census.masked += if materials.has_opacity(material) { count } else { 0 };
             census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
             census.solid += if materials.is_dielectric(material) { count } else { 0 };
+            census.dispersive += if materials.disperses(material) { count } else { 0 };
             let specular = materials.may_cast_caustics(material, min_alpha);
             census.specular += if specular { count } else { 0 };
             let storable = materials.may_be_storable(material, min_alpha);
@@ -145,6 +149,10 @@ pub fn derive_requirements(
     };
     if let Some(reason) = nesting(tables, &census, &camera, &lights, name) {
         require(Feature::NestedDielectrics, reason);
+    }
+    if census.dispersive > 0 {
+        let reason = format!("{} solids whose index depends on the wavelength", census.dispersive);
+        require(Feature::Dispersion, reason);
     }
     let skies = lights.0.iter().filter(|l| matches!(l.light, Light::Sky { .. })).count();
     if skies > 0 {

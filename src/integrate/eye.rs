@@ -253,7 +253,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             walk.throughput *= self.path.transmittance(&walk.inside, hit.t);
         }
         let counters = &mut context.counters.nesting;
-        let (hit, mut surface, beyond, outside) =
+        let (hit, mut surface, mut beyond, outside) =
             match scene.nested().meet(&walk.ray, *hit, &mut walk.inside, counters) {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
@@ -288,10 +288,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         if walk.last {
             return false;
         }
+        let (media, sides) = ((material, outside), [&mut walk.inside, &mut beyond]);
+        let medium = self.path.disperse(media, sides, &mut walk.throughput, sampler);
         let mut lobe = sampler.one(dimensions + dimension::LOBE);
         let seen = (&walk.ray, walk.cone);
         let bsdf = (material != NOTHING)
-            .then(|| self.path.bsdf(seen, hit, &mut surface, &at, outside, &mut lobe));
+            .then(|| self.path.bsdf(seen, hit, &mut surface, &at, medium, &mut lobe));
         if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
             let ray = &walk.ray;
             let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());

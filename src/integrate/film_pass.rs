@@ -9,7 +9,7 @@ use crate::film::{Film, FilmError, FilterSampler, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::math::Cone;
 use crate::sampling::{Sampler, dimension};
-use crate::shade::nesting::{Clear, Inside, OneSolid, SolidStack};
+use crate::shade::nesting::{Clear, Dispersed, Inside, OneSolid, SolidStack};
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, Vec2, Vec3};
@@ -101,9 +101,11 @@ pub fn render_film(
         (false, Around::Clear) => fill(&mut film, &begin.tracer::<false, Clear>(), &job),
         (false, Around::One) => fill(&mut film, &begin.tracer::<false, OneSolid>(), &job),
         (false, Around::Nested) => fill(&mut film, &begin.tracer::<false, SolidStack>(), &job),
+        (false, Around::Dispersed) => fill(&mut film, &begin.tracer::<false, Dispersed>(), &job),
         (true, Around::Clear) => fill(&mut film, &begin.tracer::<true, Clear>(), &job),
         (true, Around::One) => fill(&mut film, &begin.tracer::<true, OneSolid>(), &job),
         (true, Around::Nested) => fill(&mut film, &begin.tracer::<true, SolidStack>(), &job),
+        (true, Around::Dispersed) => fill(&mut film, &begin.tracer::<true, Dispersed>(), &job),
     };
     if let Some(counters) = counters {
         status.film = Some(film);
@@ -117,11 +119,14 @@ pub(super) enum Around {
     Clear,
     One,
     Nested,
+    Dispersed,
 }
 
 impl Around {
     pub(super) fn new(requirements: &Requirements) -> Self {
-        if requirements.has(Feature::NestedDielectrics) {
+        if requirements.has(Feature::Dispersion) {
+            Self::Dispersed
+        } else if requirements.has(Feature::NestedDielectrics) {
             Self::Nested
         } else if requirements.has(Feature::Absorption) {
             Self::One
@@ -133,7 +138,7 @@ impl Around {
 
 /// The side of the groups which share their paths.
 ///
-/// Paths of different times see different scenes; surfaces with holes and solids which absorb or
+/// Paths of different times or wavelengths see different scenes; surfaces with holes and solids which absorb or
 /// overlap would have to be followed along every connection; and a limit on radiance is one of single paths.
 fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
     let hindrances = [
@@ -142,6 +147,7 @@ fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
         Feature::Opacity,
         Feature::Absorption,
         Feature::NestedDielectrics,
+        Feature::Dispersion,
     ];
     let hindered = hindrances.into_iter().any(|feature| requirements.has(feature));
     if hindered || settings.clamp_indirect.is_some() { 1 } else { settings.share.clamp(1, 4) }

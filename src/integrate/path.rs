@@ -251,7 +251,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             };
             path.cone.advance(hit.t);
             let met = self.meet(path, hit, counters);
-            let (hit, mut surface, beyond, outside) = match met {
+            let (hit, mut surface, mut beyond, outside) = match met {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
                 }
@@ -284,13 +284,15 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 self.note_first_hit(path, camera_ray, &hit, &surface, None);
                 break;
             }
+            let (media, sides) = ((instance.material, outside), [&mut path.inside, &mut beyond]);
+            let medium = self.disperse(media, sides, &mut path.throughput, sampler);
             let mut lobe = if materials.needs_lobe(instance.material) {
                 sampler.one(dimensions + dimension::LOBE)
             } else {
                 0.0
             };
             let seen = (&path.ray, path.cone);
-            let bsdf = self.bsdf(seen, &hit, &mut surface, &at, outside, &mut lobe);
+            let bsdf = self.bsdf(seen, &hit, &mut surface, &at, medium, &mut lobe);
             self.note_first_hit(path, camera_ray, &hit, &surface, Some(&bsdf));
             if path.depth == self.max_depth {
                 counters.truncated += 1;
@@ -350,7 +352,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         self.scene.nested().meet(ray, hit, inside, &mut counters.nesting)
     }
 
-    /// How the surface scatters that a ray in a cone has met, with the relief of its material.
+    /// How the surface scatters that a ray in a cone has met, with the relief of its material; `medium` is what is on
+    /// its outside, and the wavelength of the path.
     #[inline]
     pub(super) fn bsdf(
         &self,
@@ -358,7 +361,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         hit: &Hit,
         surface: &mut SurfacePoint,
         at: &TexturePoint,
-        outside: Option<u32>,
+        (outside, wavelength): (Option<u32>, Option<f32>),
         lobe: &mut f32,
     ) -> Bsdf<'a> {
         let SceneView { geometry, surfaces, .. } = self.scene;
@@ -369,10 +372,24 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             geometry.turn_normal((materials, relief), cone, ray, hit, surface, at);
         }
         if I::NESTS {
-            materials.chosen_bsdf_within(chosen.material, at, outside)
+            materials.chosen_bsdf_tuned(chosen.material, at, outside, wavelength)
         } else {
             materials.chosen_bsdf(chosen.material, at)
         }
+    }
+
+    /// Lets a path choose its wavelength where it first matters; what is outside of the surface, and the wavelength.
+    #[inline]
+    pub(super) fn disperse(
+        &self,
+        media: (u32, Option<u32>),
+        [here, beyond]: [&mut I; 2],
+        throughput: &mut Rgb,
+        sampler: &Sampler,
+    ) -> (Option<u32>, Option<f32>) {
+        let sides = [&mut *here, beyond];
+        *throughput *= self.scene.nested().disperse(media, sides, sampler, dimension::WAVELENGTH);
+        (media.1, here.wavelength())
     }
 
     /// What of the scene a path stands for that was scattered.

@@ -23,7 +23,9 @@ pub mod dimension {
     pub const LENS: u32 = 2;
     /// Time in the shutter (1).
     pub const TIME: u32 = 4;
-    /// First dimension of the first vertex; 5 is kept for the wavelength.
+    /// Wavelength of a camera path (1).
+    pub const WAVELENGTH: u32 = 5;
+    /// First dimension of the first vertex.
     const FIRST_VERTEX: u32 = 6;
     /// Dimensions of one vertex; the last is kept for the distance in a medium.
     const PER_VERTEX: u32 = 8;
@@ -40,6 +42,8 @@ pub mod dimension {
     pub const LIGHT: u32 = 5;
     /// Point on a distant light (2) where one is drawn beside another; beyond all vertices.
     pub const DISTANT_LIGHT_POINT: u32 = 1 << 31;
+    /// Wavelength of a photon (1).
+    pub const PHOTON_WAVELENGTH: u32 = (1 << 31) + 2;
     /// Russian roulette, or passing through a hole (1).
     pub const ROULETTE: u32 = 6;
 }

@@ -17,7 +17,7 @@
 //! found does not depend on the direction of the ray.
 //!
 //! How much of this a path carries is a type: nothing ([`Clear`]), the solid that it entered last
-//! ([`OneSolid`]), or all ([`SolidStack`]).
+//! ([`OneSolid`]), or all ([`SolidStack`]); where indices depend on the wavelength, that as well ([`Dispersed`]).
 
 use crate::extract::NOTHING;
 use std::cmp::Reverse;
@@ -59,6 +59,8 @@ pub trait Inside: Copy + Debug + Send + Sync {
     const ABSORBS: bool;
     /// Whether solids may overlap.
     const NESTS: bool;
+    /// Whether the index of a solid may depend on the wavelength.
+    const DISPERSES: bool = false;
 
     /// Inside the solids of a stack.
     fn new(stack: &SolidStack) -> Self;
@@ -72,6 +74,26 @@ pub trait Inside: Copy + Debug + Send + Sync {
 
     /// All solids that the ray is inside of, where they are known.
     fn stack(&self) -> Option<&SolidStack>;
+
+    /// The same path inside other solids.
+    #[inline]
+    #[must_use]
+    fn within(&self, stack: &SolidStack) -> Self {
+        Self::new(stack)
+    }
+
+    /// The wavelength that a path follows, nm; `None` as long as it stands for all.
+    #[inline]
+    fn wavelength(&self) -> Option<f32> {
+        None
+    }
+
+    /// The same path at one wavelength, nm.
+    #[inline]
+    #[must_use]
+    fn tuned(&self, _nm: f32) -> Self {
+        *self
+    }
 }
 
 /// Nothing absorbs: a path need not know where it is.
@@ -208,6 +230,54 @@ impl Inside for SolidStack {
     #[inline]
     fn stack(&self) -> Option<&SolidStack> {
         Some(self)
+    }
+}
+
+/// The solids that a ray is inside of, and the wavelength that it follows.
+#[derive(Clone, Copy, Debug)]
+pub struct Dispersed {
+    stack: SolidStack,
+    wavelength: Option<f32>,
+}
+
+impl Inside for Dispersed {
+    const ABSORBS: bool = true;
+    const NESTS: bool = true;
+    const DISPERSES: bool = true;
+
+    #[inline]
+    fn new(stack: &SolidStack) -> Self {
+        Self { stack: *stack, wavelength: None }
+    }
+
+    #[inline]
+    fn medium(&self) -> u32 {
+        self.stack.medium()
+    }
+
+    #[inline]
+    fn beyond(&self, _: u32, _: bool) -> Self {
+        *self
+    }
+
+    #[inline]
+    fn stack(&self) -> Option<&SolidStack> {
+        Some(&self.stack)
+    }
+
+    #[inline]
+    fn within(&self, stack: &SolidStack) -> Self {
+        Self { stack: *stack, ..*self }
+    }
+
+    #[inline]
+    fn wavelength(&self) -> Option<f32> {
+        self.wavelength
+    }
+
+    #[inline]
+    fn tuned(&self, nm: f32) -> Self {
+        Self { wavelength: Some(nm), ..*self }
     }
 }
 

@@ -9,7 +9,7 @@ use super::bsdf::{
     AlbedoTable, Bsdf, RoughDielectric, SmoothDielectric, dielectric_average, glass_table,
 };
 use super::material::{Width, alpha, glass_width};
-use crate::description::Material;
+use crate::description::{Material, index_at_d};
 use std::sync::OnceLock;
 
 /// The tables of all pairs that can be met.
@@ -34,14 +34,17 @@ impl RelativeTables {
         let mut indices: Vec<f32> = materials
             .iter()
             .filter_map(|material| match material {
-                Material::Dielectric { ior, .. } => Some(*ior),
+                Material::Dielectric { ior, dispersion, .. } => {
+                    Some(index_at_d(*ior, dispersion.as_ref()))
+                }
                 _ => None,
             })
             .collect();
         indices.sort_unstable_by(f32::total_cmp);
         indices.dedup();
         let pairs_of = |material: &Material<u32>| match *material {
-            Material::Dielectric { ior, roughness, .. } => {
+            Material::Dielectric { ior, ref dispersion, roughness, .. } => {
+                let ior = index_at_d(ior, dispersion.as_ref());
                 let around = |&outside: &f32| Pair::new(ior, outside, Width::new(roughness));
                 indices.iter().filter_map(around).collect()
             }

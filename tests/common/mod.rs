@@ -100,6 +100,14 @@ impl Picture {
         green.iter().map(|&v| f64::from(v)).collect()
     }
 
+    /// The mean of each channel over all pixels.
+    pub fn mean_of_channels(&self) -> [f64; 3] {
+        let (width, height) = self.film.size();
+        let all = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let sum: glam::DVec3 = all.map(|(x, y)| self.at(x, y).as_dvec3()).sum();
+        (sum / f64::from(width * height)).to_array()
+    }
+
     /// The mean over all pixels, green; pixels have independent seeds.
     pub fn mean(&self) -> Estimate {
         self.mean_where(|_, _| true)

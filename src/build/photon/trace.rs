@@ -237,7 +237,7 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
                 power *= materials.transmittance(inside.medium(), hit.t);
             }
             let meeting = self.scene.meet(&ray, hit, &mut inside, &mut counters.nesting);
-            let (hit, mut surface, beyond, outside) = match meeting {
+            let (hit, mut surface, mut beyond, outside) = match meeting {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
                 }
@@ -279,7 +279,10 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             }
             let mut lobe = sampler.one(dimensions + dimension::LOBE);
             let chosen = materials.choose(material, &at, &mut lobe);
-            let bsdf = materials.chosen_bsdf_within(chosen.material, &at, outside);
+            let (media, sides) = ((material, outside), [&mut inside, &mut beyond]);
+            power *= self.scene.disperse(media, sides, sampler, dimension::PHOTON_WAVELENGTH);
+            let nm = inside.wavelength();
+            let bsdf = materials.chosen_bsdf_tuned(chosen.material, &at, outside, nm);
             if let Some(relief) = chosen.relief {
                 // What a photon stands for is not known.
                 let (turn, cone) = ((materials, relief), Cone::default());

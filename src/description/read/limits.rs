@@ -54,6 +54,8 @@ pub(super) const TRANSMITTANCE: Limits =
     Limits { min: 0.0, max: 1.0, open_min: true, open_max: false, unit: "" };
 /// Index of refraction of a clear medium relative to vacuum.
 pub(super) const IOR: Limits = closed(1.0, 10.0, "");
+/// Abbe number of a clear medium.
+pub(super) const ABBE: Limits = closed(1.0, 1e6, "");
 /// Real and imaginary part of a metal's index of refraction.
 pub(super) const METAL_INDEX: Limits = closed(0.0, 1000.0, "");
 /// Radiance, intensity, flux: their squares fit into `f32`.

@@ -272,7 +272,12 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
                 while let Some(name) = of {
                     let height = scene.displacements.get(&name).map(|by| by.texture.clone());
                     used.extend(height.map(|height| ("texture", height)));
-                    let part = names.meshes.get(&name).and_then(|mesh| mesh.field("of"));
+                    let mesh = names.meshes.get(&name);
+                    let shape = mesh.and_then(|mesh| mesh.field("shape"));
+                    let profile = shape.and_then(|shape| shape.field("profile"));
+                    let named = profile.map(|name| super::outline::unquoted(name.text()));
+                    used.extend(named.map(|name| ("profile", name)));
+                    let part = mesh.and_then(|mesh| mesh.field("of"));
                     of = part.map(|part| super::outline::unquoted(part.text()));
                     if !used.insert(("mesh", name)) {
                         break;

@@ -9,8 +9,8 @@ use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
 use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
 use crate::description::{
-    Curve, Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb, Shape, Texture,
-    TriangleMesh, Value, Wave,
+    Curve, Dispersion, Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb,
+    Shape, Texture, TriangleMesh, Value, Wave,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
@@ -235,8 +235,11 @@ pub(super) fn read_material(
         Material::Mirror { reflectance } => {
             check.color("reflectance", reflectance, &limits::SHARE);
         }
-        Material::Dielectric { ior, roughness, attenuation, priority: _ } => {
-            check.number("ior", *ior, &limits::IOR);
+        Material::Dielectric { ior, dispersion, roughness, attenuation, priority: _ } => {
+            let fine = limits::number(check.report, &cursor.at("ior"), *ior, &limits::IOR);
+            if let Some(dispersion) = dispersion.as_ref().filter(|_| fine) {
+                check_dispersion(cursor, *ior, dispersion, check.report);
+            }
             check.scalar("roughness", roughness);
             if let Some(attenuation) = attenuation {
                 let cursor = &cursor.at("attenuation");
@@ -299,6 +302,21 @@ pub(super) fn read_material(
         }
     }
     Some(material)
+}
+
+fn check_dispersion(cursor: &Cursor, ior: f32, dispersion: &Dispersion, report: &mut Report) {
+    let place = cursor.at("dispersion");
+    if let Dispersion::Abbe(number) = dispersion
+        && !limits::number(report, &place.nth(0), *number, &limits::ABBE)
+    {
+        return;
+    }
+    if let Err(error) = dispersion.check(ior) {
+        report.at("scene::out-of-range", &place, error.to_string());
+    } else if let Some(given) = cursor.field("ior").filter(|_| !dispersion.needs_ior()) {
+        let message = "this dispersion says the index of refraction itself";
+        report.at("scene::conflict", &given, message).help = Some("leave out `ior`".to_owned());
+    }
 }
 
 /// Reads a texture and checks its numbers and names; its file is only named.

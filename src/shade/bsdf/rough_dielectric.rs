@@ -66,6 +66,11 @@ impl<'t> RoughDielectric<'t> {
         Self { eta, lost, mean_lost, returned_transmission }
     }
 
+    /// The same interface at another index of refraction, near that of its table.
+    pub(crate) fn with_index(self, eta: f32) -> Self {
+        Self { eta, ..self }
+    }
+
     /// The side of `wo` (0 outside, 1 inside) and the relative index met from there.
     #[inline]
     fn side(&self, wo: Vec3) -> (usize, f32) {

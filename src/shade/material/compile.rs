@@ -2,7 +2,7 @@
 
 use super::relief::Relief;
 use super::{Compiled, Interior, MaterialTable, material_cycle};
-use crate::description::{Material, Rgb, Value};
+use crate::description::{Material, Rgb, Value, index_at_d};
 use crate::shade::bsdf::{
     AlbedoTable, ConductorFresnel, ReflectorTable, RoughDielectric, SMOOTH_BELOW_ALPHA, Widths,
     coat_table, dielectric_average, glass_table, reflector_table, reflector_table_at,
@@ -137,11 +137,15 @@ impl MaterialTable {
             coats: Vec::new(),
             glasses: Vec::new(),
             reflectors: Vec::new(),
+            curves: Vec::new(),
             relative: RelativeTables::new(materials),
         };
         let mut known = KnownTables::default();
         let kinds: Vec<Kind> =
             materials.iter().map(|material| table.compile(material, &mut known)).collect();
+        let curves: Vec<Option<u32>> =
+            materials.iter().map(|material| table.curve(material)).collect();
+        let solid_of = |index: u32| solid(index, materials).and_then(|k| curves[k as usize]);
         table.materials = kinds
             .iter()
             .enumerate()
@@ -150,17 +154,29 @@ impl MaterialTable {
                 has_opacity: has_opacity(index as u32, &kinds),
                 needs_lobe: needs_lobe(index as u32, &kinds),
                 interior: interior(index as u32, materials),
+                curve: solid_of(index as u32),
+                disperses: disperses(index as u32, materials),
                 relief: relief(&materials[index]),
             })
             .collect();
         table
     }
 
+    /// Keeps the curve of a dispersive solid.
+    fn curve(&mut self, material: &Material<u32>) -> Option<u32> {
+        let Material::Dielectric { ior, dispersion: Some(dispersion), .. } = material else {
+            return None;
+        };
+        self.curves.push(dispersion.curve(*ior));
+        Some((self.curves.len() - 1) as u32)
+    }
+
     fn compile(&mut self, material: &Material<u32>, known: &mut KnownTables) -> Kind {
         match *material {
             Material::Diffuse { albedo } => Kind::Diffuse { albedo },
             Material::Mirror { reflectance } => Kind::Mirror { reflectance },
-            Material::Dielectric { ior, roughness, .. } => {
+            Material::Dielectric { ior, ref dispersion, roughness, .. } => {
+                let ior = index_at_d(ior, dispersion.as_ref());
                 let width = glass_width(ior, Width::new(roughness));
                 let table = known.glass(&mut self.glasses, ior, width);
                 Kind::Dielectric { eta: ior, width, average: dielectric_average(ior), table }
@@ -255,18 +271,40 @@ fn relief(material: &Material<u32>) -> Option<Relief> {
     }
 }
 
-fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
+/// The first solid that a material is made of, itself perhaps.
+fn solid(index: u32, materials: &[Material<u32>]) -> Option<u32> {
     match &materials[index as usize] {
-        Material::Dielectric { ior, attenuation, priority, .. } => Some(Interior {
-            ior: *ior,
-            sigma_a: attenuation.map(|attenuation| attenuation.sigma_a()),
-            priority: *priority,
-        }),
+        Material::Dielectric { .. } => Some(index),
         Material::Masked { material, .. }
         | Material::Bump { material, .. }
-        | Material::NormalMap { material, .. } => interior(*material, materials),
-        Material::Mix { a, b, .. } => interior(*a, materials).or_else(|| interior(*b, materials)),
+        | Material::NormalMap { material, .. } => solid(*material, materials),
+        Material::Mix { a, b, .. } => solid(*a, materials).or_else(|| solid(*b, materials)),
         _ => None,
+    }
+}
+
+fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
+    let solid = solid(index, materials)?;
+    let Material::Dielectric { ior, dispersion, attenuation, priority, .. } =
+        &materials[solid as usize]
+    else {
+        unreachable!("a solid is a dielectric")
+    };
+    Some(Interior {
+        ior: index_at_d(*ior, dispersion.as_ref()),
+        sigma_a: attenuation.map(|attenuation| attenuation.sigma_a()),
+        priority: *priority,
+    })
+}
+
+fn disperses(index: u32, materials: &[Material<u32>]) -> bool {
+    match &materials[index as usize] {
+        Material::Dielectric { dispersion, .. } => dispersion.is_some(),
+        Material::Masked { material, .. }
+        | Material::Bump { material, .. }
+        | Material::NormalMap { material, .. } => disperses(*material, materials),
+        Material::Mix { a, b, .. } => disperses(*a, materials) || disperses(*b, materials),
+        _ => false,
     }
 }
 

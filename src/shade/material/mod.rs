@@ -17,7 +17,7 @@ use super::bsdf::{
 };
 use super::relative::RelativeTables;
 use super::texture::{TexturePoint, Textures};
-use crate::description::{Material, Rgb, Value};
+use crate::description::{IndexCurve, Material, Rgb, Value};
 use crate::extract::NOTHING;
 use compile::{Kind, MetalColor};
 use relief::Relief;
@@ -34,6 +34,8 @@ pub struct MaterialTable {
     coats: Vec<AlbedoTable<1>>,
     glasses: Vec<AlbedoTable<2>>,
     reflectors: Vec<ReflectorTable>,
+    /// Indices of refraction which depend on the wavelength.
+    curves: Vec<IndexCurve>,
     /// Rough interfaces to other media than air.
     relative: RelativeTables,
 }
@@ -59,6 +61,10 @@ struct Compiled {
     needs_lobe: bool,
     /// Whether it, or the first solid that it is mixed of, encloses a medium.
     interior: Option<Interior>,
+    /// How the index inside depends on the wavelength, if it does: a place in the table's curves.
+    curve: Option<u32>,
+    /// Whether it, or one that it is mixed of, has a curve.
+    disperses: bool,
     /// What turns its normals.
     relief: Option<Relief>,
 }
@@ -218,6 +224,46 @@ impl MaterialTable {
             }
             _ => self.chosen_bsdf(material, at),
         }
+    }
+
+    /// Like [`MaterialTable::chosen_bsdf_within`], at a wavelength in nm if there is one.
+    ///
+    /// Energy that a rough interface loses to a second bounce is that at the d line.
+    #[inline]
+    pub fn chosen_bsdf_tuned(
+        &self,
+        material: u32,
+        at: &TexturePoint,
+        outside: Option<u32>,
+        nm: Option<f32>,
+    ) -> Bsdf<'_> {
+        let bsdf = self.chosen_bsdf_within(material, at, outside);
+        let Some(nm) = nm else { return bsdf };
+        let index = |solid: u32| self.index(solid, nm);
+        let eta = |outside: Option<u32>| index(material) / outside.map_or(1.0, index);
+        match bsdf {
+            Bsdf::SmoothDielectric(_) => {
+                Bsdf::SmoothDielectric(SmoothDielectric { eta: eta(outside) })
+            }
+            Bsdf::RoughDielectric(rough) => Bsdf::RoughDielectric(rough.with_index(eta(outside))),
+            other => other,
+        }
+    }
+
+    /// The index of refraction of a solid of this material at a wavelength in nm; 1 of what is none.
+    #[inline]
+    pub fn index(&self, material: u32, nm: f32) -> f32 {
+        let Compiled { curve, interior, .. } = &self.materials[material as usize];
+        match curve {
+            Some(curve) => self.curves[*curve as usize].index(f64::from(nm)) as f32,
+            None => interior.map_or(1.0, |interior| interior.ior),
+        }
+    }
+
+    /// Whether the wavelength matters at a surface of this material, or inside it.
+    #[inline]
+    pub fn disperses(&self, material: u32) -> bool {
+        self.materials[material as usize].disperses
     }
 
     /// Share of the rays which the surface stops, in `[0, 1]`: 1 unless it is masked.

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::description::{
-    Attenuation, Channel, Encoding, ImageData, ImagePixels, Metal, Texture, TextureFilter,
-    TextureFiltering, Wrap,
+    Attenuation, Channel, Dispersion, Encoding, ImageData, ImagePixels, Metal, Texture,
+    TextureFilter, TextureFiltering, Wrap,
 };
 use crate::shade::bsdf::TransportMode;
 use crate::shade::metals;
@@ -16,7 +16,7 @@ fn diffuse(albedo: f32) -> Material<u32> {
 }
 
 fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Material<u32> {
-    Material::Dielectric { ior: 1.5, roughness, attenuation, priority: 0 }
+    Material::Dielectric { ior: 1.5, dispersion: None, roughness, attenuation, priority: 0 }
 }
 
 fn red(bsdf: &Bsdf) -> f32 {
@@ -190,4 +190,44 @@ fn shares_of_light_are_limited_to_one() {
     assert_eq!(red(&table.bsdf(0, &LEFT, &mut 0.5)), 1.0);
     assert_eq!(red(&table.bsdf(0, &RIGHT, &mut 0.5)), 0.0);
     assert_eq!(table.color(&Value::Texture(0), &LEFT), Rgb::splat(7.0));
+}
+
+/// Oracle: Snell's law in f64 with published indices: how much prisms of 60° turn light of the lines F, d and C, at least
+/// deviation and at 50° (BK7).
+#[test]
+fn a_prism_turns_each_line_by_its_angle() {
+    let (glass, air) = (Some(Dispersion::Bk7), None);
+    let material = |dispersion| Material::Dielectric {
+        ior: 1.5,
+        dispersion,
+        roughness: 0.0.into(),
+        attenuation: None,
+        priority: 0,
+    };
+    let table = MaterialTable::new(&[material(glass), material(air)], Textures::default());
+    assert!(table.disperses(0) && !table.disperses(1));
+    let lines = [486.1327, 587.5618, 656.2725];
+    let least = [39.138_108_7_f64, 38.646_698_5, 38.429_136_7];
+    let at_50 = [39.140_973_6_f64, 38.653_636_8, 38.438_411_8];
+    for (line, (least, at_50)) in lines.into_iter().zip(least.into_iter().zip(at_50)) {
+        let index = f64::from(table.index(0, line));
+        let symmetric = (index * 0.5).asin().to_degrees();
+        for (incidence, expected) in [(symmetric, least), (50.0, at_50)] {
+            // The angle to the normal after a face, of light which arrives at an angle on its outside or inside.
+            let refracted = |angle: f64, enters: bool| {
+                let (sin, cos) = angle.to_radians().sin_cos();
+                let wo = Vec3::new(sin as f32, 0.0, if enters { cos } else { -cos } as f32);
+                let bsdf = table.chosen_bsdf_tuned(0, &HERE, None, Some(line));
+                let drawn = bsdf.sample(wo, 0.999, Vec2::splat(0.5), TransportMode::Radiance);
+                let drawn = drawn.expect("it passes");
+                assert!(drawn.transmitted);
+                f64::from(-drawn.wi.x).atan2(f64::from(drawn.wi.z.abs())).to_degrees()
+            };
+            let inside = refracted(incidence, true);
+            let leaves = refracted(60.0 - inside, false);
+            let deviation = (incidence + leaves - 60.0).to_radians();
+            let error = deviation - expected.to_radians();
+            assert!(error.abs() < 3e-6, "{line} nm at {incidence}°: off by {error} rad");
+        }
+    }
 }

@@ -212,3 +212,21 @@ fn extrusions_say_what_is_wrong() {
         assert!(told.contains(message) && told.contains("meshes.m"), "{mesh}: {told}");
     }
 }
+
+/// A dispersion which is no clear solid's, or says the index beside another.
+#[test]
+fn dispersions_say_what_is_wrong() {
+    for (fields, message) in [
+        ("dispersion: Glas", "`Glas`"),
+        ("dispersion: Abbe(0)", "at least 1"),
+        ("dispersion: Abbe(NaN)", "`NaN` is not a finite number"),
+        ("dispersion: Cauchy(a: 0.5, b: 0)", "outside of 1 to 10"),
+        ("dispersion: Sellmeier(b: [1, 1], c: [0.01])", "as many of one as of the other"),
+        ("dispersion: Sellmeier(b: [1], c: [0.3])", "outside of 1 to 10"),
+        ("ior: 1.5, dispersion: Bk7", "says the index of refraction itself"),
+    ] {
+        let part = format!(r#"materials: {{"m": Dielectric({fields})}}"#);
+        let told = mistakes(&with_part(&part));
+        assert!(told.contains(message) && told.contains("materials.m"), "{fields}: {told}");
+    }
+}
