@@ -3,9 +3,12 @@
 //! The working space has the primaries of ITU-R BT.709 and the white point D65, and is linear: numbers
 //! are proportional to light. Display codes appear only when a file of codes is read or written.
 
+mod blackbody;
 pub mod srgb;
 pub mod tone;
 pub mod wavelength;
+
+pub use blackbody::blackbody;
 
 use glam::Vec3;
 

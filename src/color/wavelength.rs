@@ -35,7 +35,7 @@ struct Table {
 }
 
 /// XYZ of light of one wavelength.
-fn matching(nm: f64) -> DVec3 {
+pub(super) fn matching(nm: f64) -> DVec3 {
     let lobe = |height: f64, middle: f64, below: f64, above: f64| {
         let width = if nm < middle { below } else { above };
         height * (-0.5 * ((nm - middle) / width).powi(2)).exp()
@@ -50,8 +50,11 @@ fn matching(nm: f64) -> DVec3 {
 
 /// Linear Rec. 709 of light of one wavelength, outside of the gamut and not normalised.
 fn spectral_color(nm: f64) -> DVec3 {
-    let xyz = matching(nm);
-    // IEC 61966-2-1, from XYZ.
+    rec_709(matching(nm))
+}
+
+/// Linear Rec. 709 from XYZ (IEC 61966-2-1).
+pub(super) fn rec_709(xyz: DVec3) -> DVec3 {
     DVec3::new(
         xyz.dot(DVec3::new(3.2406, -1.5372, -0.4986)),
         xyz.dot(DVec3::new(-0.9689, 1.8758, 0.0415)),

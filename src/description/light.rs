@@ -13,8 +13,7 @@ pub struct Emission<R> {
 }
 
 /// The strength of an emitting shape.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(bound(deserialize = "Value<Rgb, R>: Deserialize<'de>"))]
+#[derive(Clone, Debug, PartialEq)]
 pub enum EmissionStrength<R> {
     /// Radiance leaving every point, W·m⁻²·sr⁻¹ per channel.
     Radiance(Value<Rgb, R>),

@@ -91,6 +91,9 @@ pub enum Texture<I, R> {
         /// By what share of a brick every second row is shifted.
         #[serde(default = "half")]
         shift: f32,
+        /// After how many bricks of a row their colours repeat; 0: never.
+        #[serde(default)]
+        period: u32,
         /// Which of all walls.
         #[serde(default)]
         seed: u32,
@@ -349,16 +352,19 @@ impl<I, R> Texture<I, R> {
             Self::Gradient { a, b } => {
                 Texture::Gradient { a: a.map_ref(texture)?, b: b.map_ref(texture)? }
             }
-            Self::Bricks { size, mortar, bevel, shift, seed, a, b, between } => Texture::Bricks {
-                size,
-                mortar,
-                bevel,
-                shift,
-                seed,
-                a: a.map_ref(texture)?,
-                b: b.map_ref(texture)?,
-                between: between.map_ref(texture)?,
-            },
+            Self::Bricks { size, mortar, bevel, shift, period, seed, a, b, between } => {
+                Texture::Bricks {
+                    size,
+                    mortar,
+                    bevel,
+                    shift,
+                    period,
+                    seed,
+                    a: a.map_ref(texture)?,
+                    b: b.map_ref(texture)?,
+                    between: between.map_ref(texture)?,
+                }
+            }
             Self::Noise { size, octaves, gain, turbulence, seed, a, b } => Texture::Noise {
                 size,
                 octaves,

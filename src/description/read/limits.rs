@@ -58,6 +58,8 @@ pub(super) const IOR: Limits = closed(1.0, 10.0, "");
 pub(super) const ABBE: Limits = closed(1.0, 1e6, "");
 /// Real and imaginary part of a metal's index of refraction.
 pub(super) const METAL_INDEX: Limits = closed(0.0, 1000.0, "");
+/// Temperature of what glows.
+pub(super) const TEMPERATURE: Limits = closed(500.0, 1e6, "kelvin");
 /// Radiance, intensity, flux: their squares fit into `f32`.
 pub(super) const STRENGTH: Limits = closed(0.0, 1e18, "");
 /// Half angle of a cone.

@@ -5,6 +5,7 @@ use super::decode::{Report, decode};
 use super::limits::{self, Limits};
 use super::profile::read_revolution;
 use super::source::Cursor;
+use crate::color::blackbody;
 use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
 use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
@@ -344,7 +345,7 @@ pub(super) fn read_texture(
         Texture::Gradient { a, b } | Texture::Multiply { a, b } => {
             check.colors([("a", a), ("b", b)]);
         }
-        Texture::Bricks { size, mortar, bevel, shift, seed: _, a, b, between } => {
+        Texture::Bricks { size, mortar, bevel, shift, period: _, seed: _, a, b, between } => {
             for (axis, length) in size.to_array().into_iter().enumerate() {
                 let place = cursor.at("size").nth(axis);
                 limits::number(check.report, &place, length, &limits::UV_LENGTH);
@@ -613,14 +614,36 @@ pub(super) fn read_shape(
     Some(shape)
 }
 
+/// The strength of an emitting shape as a scene file says it.
+#[derive(Debug, Deserialize)]
+#[serde(rename = "emission", deny_unknown_fields)]
+enum EmissionFile {
+    Radiance(Value<Rgb, String>),
+    Power(Rgb),
+    /// The colour of a blackbody, and its luminance in units of radiance.
+    Temperature {
+        kelvin: f64,
+        radiance: f32,
+    },
+}
+
 /// Reads the strength of an emitting shape and checks it.
 pub(super) fn read_emission(
     cursor: &Cursor,
     names: &Names,
     report: &mut Report,
 ) -> Option<Emission<String>> {
-    let strength: EmissionStrength<String> = decode(cursor, report)?;
     let place = cursor.nth(0);
+    let strength = match decode(cursor, report)? {
+        EmissionFile::Radiance(radiance) => EmissionStrength::Radiance(radiance),
+        EmissionFile::Power(power) => EmissionStrength::Power(power),
+        EmissionFile::Temperature { kelvin, radiance } => {
+            let fine = limits::number(report, &cursor.at("kelvin"), kelvin, &limits::TEMPERATURE)
+                & limits::number(report, &cursor.at("radiance"), radiance, &limits::STRENGTH);
+            let color = if fine { blackbody(kelvin) * radiance } else { Rgb::ZERO };
+            EmissionStrength::Radiance(color.into())
+        }
+    };
     match &strength {
         EmissionStrength::Power(power) => {
             limits::color(report, &place, *power, &limits::STRENGTH);

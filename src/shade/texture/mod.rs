@@ -271,12 +271,13 @@ impl Textures {
                 let share = if at.uv.x.is_nan() { 0.0 } else { at.uv.x.clamp(0.0, 1.0) };
                 self.mix([a, b], share, at)
             }
-            Texture::Bricks { size, mortar, bevel, shift, seed, a, b, between } => {
+            Texture::Bricks { size, mortar, bevel, shift, period, seed, a, b, between } => {
                 let wall = Wall {
                     size: *size,
                     mortar: *mortar,
                     bevel: *bevel,
                     shift: *shift,
+                    period: *period,
                     seed: *seed,
                 };
                 let brick = wall.at(at);

@@ -59,6 +59,7 @@ pub(super) struct Wall {
     pub(super) mortar: f32,
     pub(super) bevel: f32,
     pub(super) shift: f32,
+    pub(super) period: u32,
     pub(super) seed: u32,
 }
 
@@ -90,6 +91,10 @@ impl Wall {
             smooth((to_edge - 0.5 * (f64::from(self.bevel) - soft)) / soft)
         } else {
             f32::from(u8::from(to_edge >= 0.0))
+        };
+        let column = match self.period {
+            0 => column,
+            period => column.rem_euclid(f64::from(period)),
         };
         let number = hash(column as i64 as u32, row as i64 as u32, self.seed);
         Brick { solid: mean + (solid - mean) * blur, number: 0.5 + (number - 0.5) * blur }
@@ -162,7 +167,8 @@ mod tests {
 
     #[test]
     fn coordinates_that_are_not_finite_have_a_value() {
-        let wall = Wall { size: Vec2::ONE, mortar: 0.1, bevel: 0.0, shift: 0.5, seed: 0 };
+        let wall =
+            Wall { size: Vec2::ONE, mortar: 0.1, bevel: 0.0, shift: 0.5, period: 0, seed: 0 };
         for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
             let at = TexturePoint::at(Vec2::new(x, 0.25));
             assert_eq!(checker(&at, 0.5), 0.0);
@@ -197,11 +203,40 @@ mod tests {
         }
     }
 
+    /// A wall wrapped around a ball has no seam: the bricks after so many are those before, and else they are not.
+    #[test]
+    fn bricks_repeat_after_their_period() {
+        let wall = |period| Wall {
+            size: Vec2::new(0.24, 0.08),
+            mortar: 0.01,
+            bevel: 0.016,
+            shift: 0.5,
+            period,
+            seed: 9,
+        };
+        let mut differ = 0;
+        for k in 0..200 {
+            let uv = Vec2::new(0.037 * k as f32 - 3.0, 0.011 * k as f32);
+            let at = |wall: Wall, around: f32| wall.at(&TexturePoint::at(uv + Vec2::X * around));
+            let (here, there) = (at(wall(24), 0.0), at(wall(24), 24.0 * 0.24));
+            assert_eq!(here.number, there.number);
+            assert!((here.solid - there.solid).abs() < 1e-3);
+            differ += u32::from(at(wall(0), 0.0).number != at(wall(0), 24.0 * 0.24).number);
+        }
+        assert!(differ > 190);
+    }
+
     /// Oracle: the area of bricks in a wall, counted; and a footprint of many bricks sees about that share.
     #[test]
     fn a_wall_has_its_share_of_mortar() {
-        let wall =
-            Wall { size: Vec2::new(0.3, 0.1), mortar: 0.02, bevel: 0.0, shift: 0.5, seed: 3 };
+        let wall = Wall {
+            size: Vec2::new(0.3, 0.1),
+            mortar: 0.02,
+            bevel: 0.0,
+            shift: 0.5,
+            period: 0,
+            seed: 3,
+        };
         let n = 600;
         let mut solid = 0.0;
         for i in 0..n * n {

@@ -1,6 +1,7 @@
 //! Meshes, water and textures.
 
 use super::super::*;
+use crate::description::{EmissionStrength, Value};
 
 #[test]
 fn wrong_meshes_are_told() {
@@ -228,5 +229,32 @@ fn dispersions_say_what_is_wrong() {
         let part = format!(r#"materials: {{"m": Dielectric({fields})}}"#);
         let told = mistakes(&with_part(&part));
         assert!(told.contains(message) && told.contains("materials.m"), "{fields}: {told}");
+    }
+}
+
+/// A temperature gives the colour of a blackbody with the luminance asked for.
+#[test]
+fn lamps_glow_by_their_temperature() {
+    let lamp = |fields: &str| {
+        format!(
+            r#"(entities: {{"eye": (camera: ()), "lamp": (shape: Sphere(), emission: Temperature({fields}))}})"#
+        )
+    };
+    let scene = with_settings(&lamp("kelvin: 2700, radiance: 12"), &[]).expect("it is a lamp");
+    let emission = scene.entities["lamp"].emission.as_ref().expect("it shines");
+    let EmissionStrength::Radiance(Value::Constant(color)) = emission.strength else {
+        panic!("a constant radiance")
+    };
+    assert!((crate::color::luminance(color) - 12.0).abs() < 1e-3);
+    assert!(color.x > color.y && color.y > color.z, "{color}");
+    for (fields, message) in [
+        ("kelvin: 100, radiance: 1", "at least 500"),
+        ("kelvin: NaN, radiance: 1", "not a finite number"),
+        ("kelvin: 3000, radiance: -1", "`radiance` must be"),
+        ("kelvin: 3000", "radiance"),
+        ("kelvin: 3000, radiance: 1, power: 1", "power"),
+    ] {
+        let told = mistakes(&lamp(fields));
+        assert!(told.contains(message) && told.contains("entities.lamp"), "{fields}: {told}");
     }
 }
