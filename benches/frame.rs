@@ -116,6 +116,7 @@ fn features(c: &mut Criterion) {
         dispersion: None,
         roughness: 0.0.into(),
         attenuation,
+        scattering: None,
         priority: 0,
     };
     let amber = Attenuation { color: Vec3::new(0.9, 0.6, 0.2), distance: 0.2 };

@@ -30,6 +30,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
         dispersion: None,
         roughness: roughness.into(),
         attenuation: None,
+        scattering: None,
         priority: 0,
     };
     vec![

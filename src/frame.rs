@@ -5,8 +5,8 @@ use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
 use crate::extract::{
-    ChosenIntegrator, DicingRefused, Emissions, Instance, Instances, Surfaces, ViewCamera,
-    meshes_fit,
+    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Requirements,
+    Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError};
 use crate::integrate::{IntegrateStatus, PhotonReport};
@@ -119,6 +119,12 @@ pub enum RenderError {
         /// What the system answered.
         source: TryReserveError,
     },
+    /// Photons in a medium.
+    #[error(
+        "{0} knows nothing of solids which scatter light (`scattering`): set `integrator: Path` without \
+         `caustics: Photons`, or `Auto`"
+    )]
+    Scattering(&'static str),
     /// A mesh that is divided for the camera would take too much memory.
     #[error(
         "dicing the mesh `{mesh}` takes at least {triangles} triangles, {megabytes} MB, and \
@@ -285,6 +291,11 @@ impl Simulation {
         if let Some(first) = self.dangling() {
             self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::Dangling(first));
+        }
+        let method = self.world.resource::<ChosenIntegrator>().method;
+        if method.has_photons() && self.world.resource::<Requirements>().has(Feature::Scattering) {
+            self.world.resource_mut::<Instances>().mark_unseen();
+            return Err(RenderError::Scattering(method.name()));
         }
         if let Some(refusal) = self.world.resource::<DicingRefused>().0.clone() {
             let name = self.world.get::<Name>(refusal.mesh);
@@ -486,7 +497,13 @@ fn frame_schedule(world: &mut World) -> Schedule {
     frame.configure_sets((Extract, Marks::Extracted, Build, Marks::Built).chain());
     frame.configure_sets((Marks::Built, Integrate, Marks::Integrated).chain());
     frame.configure_sets(Build.run_if(nothing_dangles).run_if(meshes_fit));
-    frame.configure_sets(Integrate.run_if(nothing_dangles).run_if(meshes_fit).run_if(trees_fit));
+    frame.configure_sets(
+        Integrate
+            .run_if(nothing_dangles)
+            .run_if(meshes_fit)
+            .run_if(trees_fit)
+            .run_if(method_suffices),
+    );
     for set in [Marks::Opening, Marks::Stepped, Marks::Extracted, Marks::Built, Marks::Integrated] {
         frame.add_systems(mark.in_set(set));
     }

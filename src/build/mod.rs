@@ -43,7 +43,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
 /// Whether solids may overlap in this frame.
 fn solids_nest(requirements: Res<crate::extract::Requirements>) -> bool {
     use crate::extract::Feature;
-    requirements.has(Feature::NestedDielectrics) || requirements.has(Feature::Dispersion)
+    requirements.has(Feature::NestedDielectrics) || requirements.need_whole()
 }
 
 /// Whether the integrator of this frame works with photons.

@@ -174,7 +174,10 @@ impl NestedGeometry<'_> {
             Some((crossing, outside.map(|solid| solid.material)))
         });
         let beyond = inside.within(&beyond);
-        let meeting = match owner {
+        let is_seen = |(crossing, outside): &(&Crossing, Option<u32>)| {
+            !(I::SCATTERS && self.materials.is_invisible(crossing.solid.material, *outside))
+        };
+        let meeting = match owner.filter(is_seen) {
             Some((&Crossing { hit, surface, .. }, outside)) => {
                 Meeting::Surface { hit, surface, beyond, outside }
             }

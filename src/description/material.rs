@@ -40,6 +40,9 @@ pub enum Material<R> {
         /// Absorption inside; `None` is perfectly clear.
         #[serde(default)]
         attenuation: Option<Attenuation>,
+        /// Scattering inside; `None`: light goes straight on.
+        #[serde(default)]
+        scattering: Option<Scattering>,
         /// Where solids overlap, the one of the highest priority is there; the surface of another is
         /// not seen inside it. Among equal ones the solid that the scene names first wins.
         #[serde(default)]
@@ -173,6 +176,17 @@ impl Attenuation {
     }
 }
 
+/// How a solid scatters light inside, evenly everywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scattering {
+    /// Scattering coefficient per metre and channel.
+    pub coefficient: Rgb,
+    /// Mean cosine of the deflection, in (−1, 1) (Henyey and Greenstein).
+    #[serde(default)]
+    pub g: f32,
+}
+
 /// A metal with measured indices of refraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
 #[expect(missing_docs, reason = "the names say it")]
@@ -205,12 +219,13 @@ impl<R> Material<R> {
             Self::Mirror { reflectance } => {
                 Material::Mirror { reflectance: reflectance.map_ref(textures)? }
             }
-            Self::Dielectric { ior, dispersion, roughness, attenuation, priority } => {
+            Self::Dielectric { ior, dispersion, roughness, attenuation, scattering, priority } => {
                 Material::Dielectric {
                     ior,
                     dispersion,
                     roughness: roughness.map_ref(textures)?,
                     attenuation,
+                    scattering,
                     priority,
                 }
             }

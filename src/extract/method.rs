@@ -120,6 +120,14 @@ impl Facts<'_> {
     }
 }
 
+/// Whether the integrator knows all that the frame requires: photons are not scattered in solids.
+pub(crate) fn method_suffices(
+    chosen: Res<ChosenIntegrator>,
+    requirements: Res<Requirements>,
+) -> bool {
+    !(chosen.method.has_photons() && requirements.has(Feature::Scattering))
+}
+
 /// Writes [`ChosenIntegrator`] when it is different from before.
 #[expect(clippy::too_many_arguments, reason = "the signature lists what the choice depends on")]
 pub fn choose_integrator(
@@ -143,6 +151,9 @@ pub fn choose_integrator(
         (IntegratorChoice::Path, Caustics::Photons) => (Method::PathWithPhotons, None),
         (IntegratorChoice::PhotonMap, _) => (Method::PhotonMap, None),
         (IntegratorChoice::Sppm, _) => (Method::Sppm, None),
+        (IntegratorChoice::Auto, _) if requirements.has(Feature::Scattering) => {
+            (Method::Path, Some("photons are not scattered in solids".to_owned()))
+        }
         (IntegratorChoice::Auto, _) => {
             let min_alpha = settings.photons.min_alpha();
             let casts = |material| surfaces.materials.may_cast_caustics(material, min_alpha);

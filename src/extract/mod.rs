@@ -25,6 +25,7 @@ pub use emissions::{Emissions, SurfaceEmission, extract_emissions};
 pub use instance::{Geometry, Instance, NOTHING};
 pub use instances::{Instances, Meshes, extract_instances, extract_meshes};
 pub use lights::{PunctualLight, PunctualLights, extract_lights};
+pub(crate) use method::method_suffices;
 pub use method::{ChosenIntegrator, Method, choose_integrator};
 pub use requirements::{Feature, Requirements, derive_requirements};
 pub use resting::{RestingMesh, RestingMeshes, extract_resting_meshes};

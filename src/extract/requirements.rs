@@ -30,6 +30,10 @@ pub enum Feature {
     NestedDielectrics,
     /// Solids whose index of refraction depends on the wavelength: paths must know theirs, and what they are inside of.
     Dispersion,
+    /// Solids which scatter light inside.
+    Scattering,
+    /// Smooth solids of index 1, such as fog: what is inside matters, and their surfaces are none.
+    InvisibleSurfaces,
     /// Light from all around.
     Sky,
     /// Light which reaches diffuse surfaces through mirrors or glass.
@@ -48,6 +52,13 @@ impl Requirements {
     pub fn has(&self, feature: Feature) -> bool {
         self.features.iter().any(|(f, _)| *f == feature)
     }
+
+    /// Whether paths must know all that can matter in solids: [`Whole`](crate::shade::nesting::Whole).
+    pub fn need_whole(&self) -> bool {
+        [Feature::Dispersion, Feature::Scattering, Feature::InvisibleSurfaces]
+            .into_iter()
+            .any(|feature| self.has(feature))
+    }
 }
 
 /// How many objects are made of materials of a kind.
@@ -57,6 +68,8 @@ pub struct Census {
     absorbing: usize,
     solid: usize,
     dispersive: usize,
+    scattering: usize,
+    invisible: usize,
     /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
     storable: usize,
@@ -78,7 +91,11 @@ impl Census {
             census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
             census.solid += if materials.is_dielectric(material) { count } else { 0 };
             census.dispersive += if materials.disperses(material) { count } else { 0 };
-            let specular = materials.may_cast_caustics(material, min_alpha);
+            let scatters = materials.medium(material).is_some();
+            census.scattering += if scatters { count } else { 0 };
+            let invisible = materials.is_invisible(material, None);
+            census.invisible += if invisible { count } else { 0 };
+            let specular = !invisible && materials.may_cast_caustics(material, min_alpha);
             census.specular += if specular { count } else { 0 };
             let storable = materials.may_be_storable(material, min_alpha);
             census.storable += if storable { count } else { 0 };
@@ -153,6 +170,14 @@ pub fn derive_requirements(
     if census.dispersive > 0 {
         let reason = format!("{} solids whose index depends on the wavelength", census.dispersive);
         require(Feature::Dispersion, reason);
+    }
+    if census.scattering > 0 {
+        let reason = format!("{} solids which scatter light", census.scattering);
+        require(Feature::Scattering, reason);
+    }
+    if census.invisible > 0 {
+        let reason = format!("{} smooth solids of index 1", census.invisible);
+        require(Feature::InvisibleSurfaces, reason);
     }
     let skies = lights.0.iter().filter(|l| matches!(l.light, Light::Sky { .. })).count();
     if skies > 0 {

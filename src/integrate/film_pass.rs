@@ -9,7 +9,7 @@ use crate::film::{Film, FilmError, FilterSampler, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::math::Cone;
 use crate::sampling::{Sampler, dimension};
-use crate::shade::nesting::{Clear, Dispersed, Inside, OneSolid, SolidStack};
+use crate::shade::nesting::{Clear, Inside, OneSolid, SolidStack, Whole};
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, Vec2, Vec3};
@@ -101,11 +101,11 @@ pub fn render_film(
         (false, Around::Clear) => fill(&mut film, &begin.tracer::<false, Clear>(), &job),
         (false, Around::One) => fill(&mut film, &begin.tracer::<false, OneSolid>(), &job),
         (false, Around::Nested) => fill(&mut film, &begin.tracer::<false, SolidStack>(), &job),
-        (false, Around::Dispersed) => fill(&mut film, &begin.tracer::<false, Dispersed>(), &job),
+        (false, Around::Whole) => fill(&mut film, &begin.tracer::<false, Whole>(), &job),
         (true, Around::Clear) => fill(&mut film, &begin.tracer::<true, Clear>(), &job),
         (true, Around::One) => fill(&mut film, &begin.tracer::<true, OneSolid>(), &job),
         (true, Around::Nested) => fill(&mut film, &begin.tracer::<true, SolidStack>(), &job),
-        (true, Around::Dispersed) => fill(&mut film, &begin.tracer::<true, Dispersed>(), &job),
+        (true, Around::Whole) => fill(&mut film, &begin.tracer::<true, Whole>(), &job),
     };
     if let Some(counters) = counters {
         status.film = Some(film);
@@ -119,13 +119,13 @@ pub(super) enum Around {
     Clear,
     One,
     Nested,
-    Dispersed,
+    Whole,
 }
 
 impl Around {
     pub(super) fn new(requirements: &Requirements) -> Self {
-        if requirements.has(Feature::Dispersion) {
-            Self::Dispersed
+        if requirements.need_whole() {
+            Self::Whole
         } else if requirements.has(Feature::NestedDielectrics) {
             Self::Nested
         } else if requirements.has(Feature::Absorption) {
@@ -147,9 +147,9 @@ fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
         Feature::Opacity,
         Feature::Absorption,
         Feature::NestedDielectrics,
-        Feature::Dispersion,
     ];
-    let hindered = hindrances.into_iter().any(|feature| requirements.has(feature));
+    let hindered = requirements.need_whole()
+        || hindrances.into_iter().any(|feature| requirements.has(feature));
     if hindered || settings.clamp_indirect.is_some() { 1 } else { settings.share.clamp(1, 4) }
 }
 

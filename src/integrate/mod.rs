@@ -2,6 +2,7 @@
 
 mod eye;
 mod film_pass;
+mod medium;
 mod path;
 mod photon_passes;
 mod radius;

@@ -27,6 +27,7 @@ use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::nesting::{Inside, NestingFaults};
 use crate::shade::{Bsdf, BsdfSample, TexturePoint};
 use glam::{DVec3, Vec2, Vec3};
+use std::ops::ControlFlow;
 
 /// The path tracer with its settings.
 ///
@@ -89,23 +90,23 @@ pub(super) enum Arrival {
 }
 
 /// A path on its way.
-struct Path<'a, I> {
-    ray: Ray,
+pub(super) struct Path<'a, I> {
+    pub(super) ray: Ray,
     /// What of the scene the path stands for.
-    cone: Cone,
-    radiance: Rgb,
-    throughput: Rgb,
+    pub(super) cone: Cone,
+    pub(super) radiance: Rgb,
+    pub(super) throughput: Rgb,
     /// Product of the η² by which refraction has scaled the throughput so far, inverted.
     eta_scale: f32,
-    arrival: Arrival,
+    pub(super) arrival: Arrival,
     first_hit: Option<FirstHit>,
-    inside: I,
+    pub(super) inside: I,
     /// Whether a light was drawn already.
     lit: bool,
-    /// Surface interactions.
-    depth: u32,
-    /// Surfaces met: those which let the ray pass count only here.
-    met: u32,
+    /// Interactions with surfaces, and with media.
+    pub(super) depth: u32,
+    /// The same with surfaces which let the ray pass.
+    pub(super) met: u32,
     departure: Option<Departure<'a>>,
     landing: Option<Landing>,
     /// Radiance gathered before the landing, and the throughput there.
@@ -144,7 +145,7 @@ impl<'a, I> Path<'a, I> {
 
     /// Russian roulette with a number in `[0, 1)`: whether the path goes on, which it then does for
     /// those that do not.
-    fn survives<const SHARE: bool>(&mut self, u: f32, gain: f32) -> bool {
+    pub(super) fn survives<const SHARE: bool>(&mut self, u: f32, gain: f32) -> bool {
         let carried = self.carried::<SHARE>() * self.eta_scale;
         let survival = (carried.max_element() * gain).min(1.0);
         if u >= survival || survival.is_nan() {
@@ -241,15 +242,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) {
-        loop {
-            counters.rays += 1;
-            let from_camera = path.met == 0;
-            let Some(hit) = self.scene.geometry.closest_hit(&path.ray, f64::INFINITY, from_camera)
-            else {
-                self.escape(path, counters);
-                break;
-            };
-            path.cone.advance(hit.t);
+        while let ControlFlow::Continue(hit) = self.advance::<SHARE>(path, sampler, counters) {
+            let Some(hit) = hit else { continue };
             let met = self.meet(path, hit, counters);
             let (hit, mut surface, mut beyond, outside) = match met {
                 Meeting::Surface { hit, surface, beyond, outside } => {
@@ -342,10 +336,34 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         }
     }
 
+    /// What a path hits next; nothing where it was scattered on the way, and a break where it ends.
+    #[inline]
+    fn advance<const SHARE: bool>(
+        &self,
+        path: &mut Path<'a, I>,
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> ControlFlow<(), Option<Hit>> {
+        counters.rays += 1;
+        let from_camera = path.met == 0;
+        let hit = self.scene.geometry.closest_hit(&path.ray, f64::INFINITY, from_camera);
+        if I::SCATTERS
+            && let Some(goes_on) = self.fly::<SHARE>(path, hit.as_ref(), sampler, counters)
+        {
+            return if goes_on { ControlFlow::Continue(None) } else { ControlFlow::Break(()) };
+        }
+        let Some(hit) = hit else {
+            self.escape(path, counters);
+            return ControlFlow::Break(());
+        };
+        path.cone.advance(hit.t);
+        ControlFlow::Continue(Some(hit))
+    }
+
     /// Follows a path to a hit, through what is around it, and tells what it meets there.
     #[inline]
     fn meet(&self, path: &mut Path<'a, I>, hit: Hit, counters: &mut PathCounters) -> Meeting<I> {
-        if I::ABSORBS {
+        if I::ABSORBS && !(I::SCATTERS && self.medium(&path.inside).is_some()) {
             path.throughput *= self.transmittance(&path.inside, hit.t);
         }
         let Path { ray, inside, .. } = path;
@@ -508,6 +526,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let (shadow_ray, end) = light.shadow_ray(receiver, time);
         counters.rays += 1;
         let inside = sides.towards(light.wi, vertex);
+        if I::SCATTERS {
+            let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
+            let left = self.transmitted(&shadow_ray, end, inside);
+            return f_cos * light.radiance * left * (weight / light.pdf);
+        }
         let visible = self.visible(&shadow_ray, end, inside);
         if visible == 0.0 {
             return Rgb::ZERO;

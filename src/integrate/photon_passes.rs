@@ -26,7 +26,7 @@ use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
 use crate::film::{Film, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::sampling::{Sampler, dimension};
-use crate::shade::nesting::{Clear, Dispersed, Inside, NestingFaults, OneSolid, SolidStack};
+use crate::shade::nesting::{Clear, Inside, NestingFaults, OneSolid, SolidStack, Whole};
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, Vec2};
@@ -141,17 +141,13 @@ pub fn render_film_with_photons(
         (true, Around::Nested) => {
             setting.fill(film_mut, begin.tracer::<false, SolidStack>(), scratch)
         }
-        (true, Around::Dispersed) => {
-            setting.fill(film_mut, begin.tracer::<false, Dispersed>(), scratch)
-        }
+        (true, Around::Whole) => setting.fill(film_mut, begin.tracer::<false, Whole>(), scratch),
         (false, Around::Clear) => setting.fill(film_mut, begin.tracer::<true, Clear>(), scratch),
         (false, Around::One) => setting.fill(film_mut, begin.tracer::<true, OneSolid>(), scratch),
         (false, Around::Nested) => {
             setting.fill(film_mut, begin.tracer::<true, SolidStack>(), scratch)
         }
-        (false, Around::Dispersed) => {
-            setting.fill(film_mut, begin.tracer::<true, Dispersed>(), scratch)
-        }
+        (false, Around::Whole) => setting.fill(film_mut, begin.tracer::<true, Whole>(), scratch),
     };
     if let Some((counters, report)) = done {
         status.film = Some(film);

@@ -27,7 +27,7 @@ pub mod dimension {
     pub const WAVELENGTH: u32 = 5;
     /// First dimension of the first vertex.
     const FIRST_VERTEX: u32 = 6;
-    /// Dimensions of one vertex; the last is kept for the distance in a medium.
+    /// Dimensions of one vertex.
     const PER_VERTEX: u32 = 8;
 
     /// First dimension of vertex `k`, counted from 0 at the first surface.
@@ -46,6 +46,8 @@ pub mod dimension {
     pub const PHOTON_WAVELENGTH: u32 = (1 << 31) + 2;
     /// Russian roulette, or passing through a hole (1).
     pub const ROULETTE: u32 = 6;
+    /// Distance flown in a medium to the vertex (1).
+    pub const DISTANCE: u32 = 7;
 }
 
 /// The random numbers of one sample of one pixel.

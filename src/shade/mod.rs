@@ -11,6 +11,7 @@
 
 mod bsdf;
 mod material;
+pub mod medium;
 mod metals;
 pub mod nesting;
 mod relative;

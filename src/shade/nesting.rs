@@ -17,7 +17,8 @@
 //! found does not depend on the direction of the ray.
 //!
 //! How much of this a path carries is a type: nothing ([`Clear`]), the solid that it entered last
-//! ([`OneSolid`]), or all ([`SolidStack`]); where indices depend on the wavelength, that as well ([`Dispersed`]).
+//! ([`OneSolid`]), or all ([`SolidStack`]); where solids scatter light or
+//! their indices depend on the wavelength, that as well ([`Whole`]).
 
 use crate::extract::NOTHING;
 use std::cmp::Reverse;
@@ -61,6 +62,8 @@ pub trait Inside: Copy + Debug + Send + Sync {
     const NESTS: bool;
     /// Whether the index of a solid may depend on the wavelength.
     const DISPERSES: bool = false;
+    /// Whether what is around a ray may scatter light.
+    const SCATTERS: bool = false;
 
     /// Inside the solids of a stack.
     fn new(stack: &SolidStack) -> Self;
@@ -233,17 +236,18 @@ impl Inside for SolidStack {
     }
 }
 
-/// The solids that a ray is inside of, and the wavelength that it follows.
+/// The solids that a ray is inside of, which may scatter light, and the wavelength that it follows.
 #[derive(Clone, Copy, Debug)]
-pub struct Dispersed {
+pub struct Whole {
     stack: SolidStack,
     wavelength: Option<f32>,
 }
 
-impl Inside for Dispersed {
+impl Inside for Whole {
     const ABSORBS: bool = true;
     const NESTS: bool = true;
     const DISPERSES: bool = true;
+    const SCATTERS: bool = true;
 
     #[inline]
     fn new(stack: &SolidStack) -> Self {

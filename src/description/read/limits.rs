@@ -58,6 +58,11 @@ pub(super) const IOR: Limits = closed(1.0, 10.0, "");
 pub(super) const ABBE: Limits = closed(1.0, 1e6, "");
 /// Real and imaginary part of a metal's index of refraction.
 pub(super) const METAL_INDEX: Limits = closed(0.0, 1000.0, "");
+/// Scattering per metre.
+pub(super) const COEFFICIENT: Limits = closed(0.0, 1e12, "per metre");
+/// Mean cosine of what a medium scatters.
+pub(super) const MEAN_COSINE: Limits =
+    Limits { min: -1.0, max: 1.0, open_min: true, open_max: true, unit: "" };
 /// Temperature of what glows.
 pub(super) const TEMPERATURE: Limits = closed(500.0, 1e6, "kelvin");
 /// Radiance, intensity, flux: their squares fit into `f32`.

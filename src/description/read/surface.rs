@@ -236,7 +236,14 @@ pub(super) fn read_material(
         Material::Mirror { reflectance } => {
             check.color("reflectance", reflectance, &limits::SHARE);
         }
-        Material::Dielectric { ior, dispersion, roughness, attenuation, priority: _ } => {
+        Material::Dielectric {
+            ior,
+            dispersion,
+            roughness,
+            attenuation,
+            scattering,
+            priority: _,
+        } => {
             let fine = limits::number(check.report, &cursor.at("ior"), *ior, &limits::IOR);
             if let Some(dispersion) = dispersion.as_ref().filter(|_| fine) {
                 check_dispersion(cursor, *ior, dispersion, check.report);
@@ -247,6 +254,12 @@ pub(super) fn read_material(
                 let mut check = Parameters { cursor, names, report: check.report };
                 check.rgb("color", attenuation.color, &limits::TRANSMITTANCE);
                 check.number("distance", attenuation.distance, &limits::LENGTH);
+            }
+            if let Some(scattering) = scattering {
+                let cursor = &cursor.at("scattering");
+                let mut check = Parameters { cursor, names, report: check.report };
+                check.rgb("coefficient", scattering.coefficient, &limits::COEFFICIENT);
+                check.number("g", scattering.g, &limits::MEAN_COSINE);
             }
         }
         Material::ThinGlass { ior, tint } => {

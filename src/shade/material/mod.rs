@@ -15,9 +15,10 @@ use super::bsdf::{
     ReflectorLobe, ReflectorTable, RoughConductor, RoughDielectric, RoughPlastic, SmoothConductor,
     SmoothDielectric, SmoothPlastic, ThinGlass, reflector_table,
 };
+use super::medium::{HenyeyGreenstein, Medium};
 use super::relative::RelativeTables;
 use super::texture::{TexturePoint, Textures};
-use crate::description::{IndexCurve, Material, Rgb, Value};
+use crate::description::{IndexCurve, Material, Rgb, Scattering, Value};
 use crate::extract::NOTHING;
 use compile::{Kind, MetalColor};
 use relief::Relief;
@@ -47,6 +48,8 @@ pub struct Interior {
     pub ior: f32,
     /// Absorption coefficient per metre; `None` is perfectly clear.
     pub sigma_a: Option<Rgb>,
+    /// What is scattered; `None` where light goes straight on.
+    pub scattering: Option<Scattering>,
     /// Where solids overlap, the one of the highest priority is there.
     pub priority: i32,
 }
@@ -258,6 +261,28 @@ impl MaterialTable {
             Some(curve) => self.curves[*curve as usize].index(f64::from(nm)) as f32,
             None => interior.map_or(1.0, |interior| interior.ior),
         }
+    }
+
+    /// The medium inside a solid of this material which scatters; `None` for air ([`NOTHING`]) and all others.
+    #[inline]
+    pub fn medium(&self, material: u32) -> Option<Medium> {
+        if material == NOTHING {
+            return None;
+        }
+        let interior = self.interior(material)?;
+        let Scattering { coefficient, g } =
+            interior.scattering.filter(|scattering| scattering.coefficient != Rgb::ZERO)?;
+        let sigma_t = coefficient + interior.sigma_a.unwrap_or(Rgb::ZERO);
+        Some(Medium { sigma_s: coefficient, sigma_t, phase: HenyeyGreenstein { g } })
+    }
+
+    /// Whether a smooth surface with equal indices on both sides, at all wavelengths, is no surface: only what is inside
+    /// matters.
+    pub fn is_invisible(&self, material: u32, outside: Option<u32>) -> bool {
+        let Compiled { kind, disperses, .. } = &self.materials[material as usize];
+        let Kind::Dielectric { eta, width: Width::Smooth, .. } = kind else { return false };
+        let around = outside.map_or(1.0, |outside| self.index(outside, 0.0));
+        !disperses && outside.is_none_or(|outside| !self.disperses(outside)) && *eta == around
     }
 
     /// Whether the wavelength matters at a surface of this material, or inside it.

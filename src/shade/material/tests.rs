@@ -16,7 +16,14 @@ fn diffuse(albedo: f32) -> Material<u32> {
 }
 
 fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Material<u32> {
-    Material::Dielectric { ior: 1.5, dispersion: None, roughness, attenuation, priority: 0 }
+    Material::Dielectric {
+        ior: 1.5,
+        dispersion: None,
+        roughness,
+        attenuation,
+        scattering: None,
+        priority: 0,
+    }
 }
 
 fn red(bsdf: &Bsdf) -> f32 {
@@ -107,7 +114,10 @@ fn solids_know_their_interior() {
         let left = (-sigma_a * 0.02).exp();
         assert!((left - color).abs().max_element() < 1e-6, "{left}");
     }
-    assert_eq!(table.interior(2), Some(Interior { ior: 1.5, sigma_a: None, priority: 0 }));
+    assert_eq!(
+        table.interior(2),
+        Some(Interior { ior: 1.5, sigma_a: None, scattering: None, priority: 0 })
+    );
     assert_eq!(table.attenuation(2), None);
     assert!(table.is_dielectric(2) && !table.is_dielectric(3));
 }
@@ -202,6 +212,7 @@ fn a_prism_turns_each_line_by_its_angle() {
         dispersion,
         roughness: 0.0.into(),
         attenuation: None,
+        scattering: None,
         priority: 0,
     };
     let table = MaterialTable::new(&[material(glass), material(air)], Textures::default());

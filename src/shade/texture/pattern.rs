@@ -219,8 +219,9 @@ mod tests {
             let uv = Vec2::new(0.037 * k as f32 - 3.0, 0.011 * k as f32);
             let at = |wall: Wall, around: f32| wall.at(&TexturePoint::at(uv + Vec2::X * around));
             let (here, there) = (at(wall(24), 0.0), at(wall(24), 24.0 * 0.24));
-            assert_eq!(here.number, there.number);
             assert!((here.solid - there.solid).abs() < 1e-3);
+            // In the mortar it is a matter of rounding which brick is meant.
+            assert!(here.solid < 0.01 || here.number == there.number);
             differ += u32::from(at(wall(0), 0.0).number != at(wall(0), 24.0 * 0.24).number);
         }
         assert!(differ > 190);

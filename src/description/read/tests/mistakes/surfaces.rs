@@ -214,9 +214,9 @@ fn extrusions_say_what_is_wrong() {
     }
 }
 
-/// A dispersion which is no clear solid's, or says the index beside another.
+/// A dispersion which is no clear solid's, or says the index beside another; scattering out of range.
 #[test]
-fn dispersions_say_what_is_wrong() {
+fn solids_say_what_is_wrong() {
     for (fields, message) in [
         ("dispersion: Glas", "`Glas`"),
         ("dispersion: Abbe(0)", "at least 1"),
@@ -225,6 +225,9 @@ fn dispersions_say_what_is_wrong() {
         ("dispersion: Sellmeier(b: [1, 1], c: [0.01])", "as many of one as of the other"),
         ("dispersion: Sellmeier(b: [1], c: [0.3])", "outside of 1 to 10"),
         ("ior: 1.5, dispersion: Bk7", "says the index of refraction itself"),
+        ("scattering: (coefficient: (-1, 0, 0))", "at least 0"),
+        ("scattering: (coefficient: (1, 1, 1), g: 1)", "less than 1"),
+        ("scattering: (g: 0)", "coefficient"),
     ] {
         let part = format!(r#"materials: {{"m": Dielectric({fields})}}"#);
         let told = mistakes(&with_part(&part));

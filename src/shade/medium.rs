@@ -1,0 +1,194 @@
+//! Media which scatter light: how far it flies, and where it goes on.
+
+use crate::description::Rgb;
+use crate::math::Frame;
+use glam::{DVec3, Vec2, Vec3};
+use std::f32::consts::{PI, TAU};
+
+/// A homogeneous medium.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium {
+    /// Scattering coefficient per metre.
+    pub sigma_s: Rgb,
+    /// Extinction coefficient per metre: scattering and absorption.
+    pub sigma_t: Rgb,
+    /// The phase function.
+    pub phase: HenyeyGreenstein,
+}
+
+/// How far light has flown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flight {
+    /// Where it scattered, metres; `None` if it came to the end.
+    pub scattered_at: Option<f64>,
+    /// What a path then counts: what is left of it, and is scattered, over the probability of that.
+    pub weight: Rgb,
+}
+
+impl Medium {
+    /// Share of light which is left after a distance in metres (Beer and Lambert).
+    #[inline]
+    pub fn transmittance(&self, distance: f64) -> Rgb {
+        if distance == f64::INFINITY {
+            return self.sigma_t.map(|sigma| if sigma > 0.0 { 0.0 } else { 1.0 });
+        }
+        (-self.sigma_t.as_dvec3() * distance).map(f64::exp).as_vec3()
+    }
+
+    /// A flight over at most `end` metres, by a number in `[0, 1)`.
+    ///
+    /// One channel draws the distance, and the balance heuristic over what all of them would have drawn weights it (one
+    /// sample of Veach 1997, *Robust Monte Carlo Methods for Light Transport Simulation*, section 9.2.4).
+    pub fn fly(&self, end: f64, u: f64) -> Flight {
+        let sigma_t = self.sigma_t.as_dvec3();
+        let channel = ((3.0 * u) as usize).min(2);
+        let drawn = -(-(3.0 * u - channel as f64)).ln_1p() / sigma_t[channel];
+        // 0 by 0 where a channel does not meet anything.
+        let t = if drawn.is_nan() { f64::INFINITY } else { drawn };
+        // Relative to the clearest channel, since all of them may be next to nothing.
+        let least = sigma_t.min_element();
+        let left = |distance: f64| {
+            let thicker = sigma_t - least;
+            DVec3::from_array(
+                thicker.to_array().map(|s| if s > 0.0 { (-s * distance).exp() } else { 1.0 }),
+            )
+        };
+        let mean = |values: DVec3| values.element_sum() / 3.0;
+        if t < end {
+            let left = left(t);
+            let weight = self.sigma_s.as_dvec3() * left / mean(sigma_t * left);
+            Flight { scattered_at: Some(t), weight: weight.as_vec3() }
+        } else {
+            let left = left(end);
+            Flight { scattered_at: None, weight: (left / mean(left)).as_vec3() }
+        }
+    }
+}
+
+/// Henyey and Greenstein's phase function (1941, "Diffuse radiation in the Galaxy", *Astrophys. J.* 93), a density over
+/// directions by the angle of deflection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HenyeyGreenstein {
+    /// Mean cosine of the deflection, in (−1, 1): 0 is isotropic, positive is forwards.
+    pub g: f32,
+}
+
+impl HenyeyGreenstein {
+    /// Per steradian, for light that is deflected by an angle of this cosine.
+    #[inline]
+    pub fn density(&self, cos: f32) -> f32 {
+        let g = self.g;
+        // (1 − g)² + 2g(1 − cos): no cancellation where a narrow peak is met.
+        let squared = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos);
+        (1.0 - g) * (1.0 + g) / (2.0 * TAU * squared * squared.sqrt())
+    }
+
+    /// A direction after light that went along the unit vector `d`, with its density.
+    pub fn sample(&self, d: Vec3, u: Vec2) -> (Vec3, f32) {
+        /// Below this the closed form loses more digits than the series of first order lacks.
+        const NEARLY_ISOTROPIC: f32 = 4e-3;
+        let g = self.g;
+        let s = 2.0 * u.x - 1.0;
+        let cos = if g.abs() < NEARLY_ISOTROPIC {
+            s + 1.5 * g * (1.0 - s * s)
+        } else {
+            let ratio = (1.0 - g) * (1.0 + g) / (1.0 + g * s);
+            (1.0 + g * g - ratio * ratio) / (2.0 * g)
+        };
+        let cos = cos.clamp(-1.0, 1.0);
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
+        let wi = Frame::from_z(d).from_local(Vec3::new(sin * cos_phi, sin * sin_phi, cos));
+        let wi = wi.normalize();
+        (wi, self.density(wi.dot(d)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Sampler;
+
+    fn medium(sigma_s: Rgb, sigma_a: Rgb) -> Medium {
+        Medium { sigma_s, sigma_t: sigma_s + sigma_a, phase: HenyeyGreenstein { g: 0.0 } }
+    }
+
+    /// Closed forms: densities forwards, backwards and at an angle; the cosine drawn by a half; the mean of the cosine and
+    /// of its square; and the density integrates to 1.
+    #[test]
+    fn deflections_follow_henyey_and_greenstein() {
+        for (g, cos, expected) in
+            [(0.8, 1.0, 3.580_986_2), (0.8, -1.0, 0.004_912_2), (-0.3, 0.2, 0.054_406_8)]
+        {
+            let density = HenyeyGreenstein { g }.density(cos);
+            assert!((density / expected - 1.0_f32).abs() < 1e-4, "{g} {cos}: {density}");
+        }
+        let (wi, _) = HenyeyGreenstein { g: 0.5 }.sample(Vec3::Z, Vec2::splat(0.5));
+        assert!((wi.z - 0.6875).abs() < 1e-6, "{wi}");
+        let n = 1 << 14;
+        for g in [-0.999, -0.5, -1e-3, 0.0, 3.9e-3, 4.1e-3, 0.3, 0.8, 0.999] {
+            let phase = HenyeyGreenstein { g };
+            let d = Vec3::new(0.3, -0.5, 0.7).normalize();
+            let (mut first, mut second, mut solid_angle) = (0.0, 0.0, 0.0);
+            for index in 0..n {
+                let sampler = Sampler::new(1, 0, (0, 0), index);
+                let (wi, density) = phase.sample(d, sampler.two(0));
+                assert!(density.is_finite() && density > 0.0, "{g}");
+                let cos = f64::from(wi.dot(d));
+                first += cos / f64::from(n);
+                second += cos * cos / f64::from(n);
+                solid_angle +=
+                    f64::from(2.0 * TAU * phase.density(2.0 * sampler.one(2) - 1.0)) / f64::from(n);
+            }
+            let g = f64::from(g);
+            assert!((first - g).abs() < 2e-3, "{g}: {first}");
+            assert!((second - (1.0 + 2.0 * g * g) / 3.0).abs() < 3e-3, "{g}: {second}");
+            // Evenly drawn cosines hardly meet a narrow peak.
+            assert!(g.abs() > 0.9 || (solid_angle - 1.0).abs() < 0.02, "{g}: {solid_angle}");
+        }
+    }
+
+    /// Closed forms, channel by channel: the share that comes to the end is `exp(−σd)`, what scatters is the albedo times
+    /// the rest, and the mean distance is `1/σ`.
+    #[test]
+    fn flights_follow_beer_and_lambert_in_every_channel() {
+        let fog = medium(Rgb::new(0.5, 2.0, 0.0), Rgb::new(0.0, 1.0, 0.0));
+        let (n, end) = (1 << 16, 3.0);
+        let (mut through, mut scattered, mut far) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        for k in 0..n {
+            let u = (f64::from(k) + 0.5) / f64::from(n);
+            let Flight { scattered_at, weight } = fog.fly(end, u);
+            match scattered_at {
+                None => through += weight.as_dvec3() / f64::from(n),
+                Some(_) => scattered += weight.as_dvec3() / f64::from(n),
+            }
+            let endless = fog.fly(f64::INFINITY, u);
+            let t = endless.scattered_at.unwrap_or(0.0);
+            far += endless.weight.as_dvec3() * t / f64::from(n);
+        }
+        let left = fog.transmittance(end).as_dvec3();
+        assert!((left - DVec3::new(0.223_130_2, (-9.0_f64).exp(), 1.0)).abs().max_element() < 1e-6);
+        assert!((through - left).abs().max_element() < 1e-3, "{through} instead of {left}");
+        let albedo = DVec3::new(1.0, 2.0 / 3.0, 0.0);
+        let expected = albedo * (1.0 - left);
+        assert!((scattered - expected).abs().max_element() < 2e-3, "{scattered}");
+        let expected = DVec3::new(2.0, 2.0 / 9.0, 0.0);
+        assert!((far - expected).abs().max_element() < 5e-3, "{far}");
+    }
+
+    /// Nothing, next to nothing and stone: finite weights, and what is expected.
+    #[test]
+    fn extremes_of_extinction() {
+        for sigma in [0.0_f32, 1e-9, 1.0, 1e9] {
+            let fog = medium(Rgb::splat(sigma), Rgb::new(0.0, sigma, 0.0));
+            for u in [0.0, 0.3, 0.5, 1.0_f64.next_down()] {
+                for end in [1e-6, 1.0, 1e6, f64::INFINITY] {
+                    let Flight { scattered_at, weight } = fog.fly(end, u);
+                    assert!(weight.is_finite() && weight.max_element() <= 3.0, "{sigma} {u} {end}");
+                    assert!(scattered_at.is_none_or(|t| t < end));
+                    assert!(sigma > 0.0 || scattered_at.is_none() && weight == Rgb::ONE);
+                }
+            }
+        }
+    }
+}
