@@ -30,8 +30,8 @@ mod tests {
     use super::*;
 
     /// Oracle: published chromaticities of blackbodies: CIE standard illuminant A is one of 2856 K; the others are from
-    /// Wyszecki and Stiles 1982, *Color Science*, 2nd ed., table 1(3.3.8). The analytic matching functions are good to
-    /// some thousandths.
+    /// Wyszecki and Stiles 1982, *Color Science*, 2nd ed., table 1(3.3.8). The analytic matching functions are off by
+    /// 3.4e-3 at 2000 K, 1.6e-3 at 2856 K and less than 2e-4 from 6500 K on (measured).
     #[test]
     fn chromaticities_are_those_of_the_planckian_locus() {
         for (kelvin, x, y) in [
@@ -44,7 +44,7 @@ mod tests {
             let xyz = planckian(kelvin);
             let (found_x, found_y) = (xyz.x / xyz.element_sum(), xyz.y / xyz.element_sum());
             let off = (found_x - x).hypot(found_y - y);
-            assert!(off < 6e-3, "{kelvin} K: {found_x} {found_y}");
+            assert!(off < 4e-3, "{kelvin} K: {found_x} {found_y}");
         }
     }
 
@@ -54,7 +54,8 @@ mod tests {
         let mut before = f32::INFINITY;
         for kelvin in [500.0, 1000.0, 2000.0, 3000.0, 5000.0, 7000.0, 1e4, 3e4, 1e6] {
             let color = blackbody(kelvin);
-            assert!((luminance(color) - 1.0).abs() < 1e-5, "{kelvin} K: {color}");
+            // The division and the sum round five times.
+            assert!((luminance(color) - 1.0).abs() < 5.0 * f32::EPSILON, "{kelvin} K: {color}");
             assert!(color.min_element() >= 0.0 && color.is_finite());
             let warmth = color.x - color.z;
             assert!(warmth < before, "{kelvin} K: {color}");

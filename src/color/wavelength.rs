@@ -115,23 +115,30 @@ mod tests {
     #[test]
     fn white_stays_white() {
         let total: DVec3 = (380..730).map(|nm| density(f64::from(nm) + 0.5)).sum();
-        assert!((total - 1.0).abs().max_element() < 1e-12, "{total}");
+        assert!((total - 1.0).abs().max_element() < BINS as f64 * f64::EPSILON, "{total}");
         let drawn = || (0..N).map(|k| draw((k as f32 + 0.5) / N as f32));
         let mean: DVec3 =
             drawn().map(|drawn| drawn.weight.as_dvec3()).sum::<DVec3>() / f64::from(N);
-        assert!((mean - 1.0).abs().max_element() < 1e-4, "{mean}");
+        // At each border of two bins one number may fall on the wrong side, and counts the difference of their weights;
+        // f32 rounds numbers and weights.
+        let ratio = |k: usize| table().weights[k] / (table().weights[k].element_sum() / 3.0);
+        let steps = (1..BINS).map(|k| (ratio(k) - ratio(k - 1)).abs().max_element());
+        let border = steps.sum::<f64>() / f64::from(N) + 3.0 * f64::from(f32::EPSILON);
+        assert!((mean - 1.0).abs().max_element() < border, "{mean}");
         for (from, to) in [(400.0, 450.0), (450.0, 550.0), (600.0, 650.0)] {
             let inside = |d: &DrawnWavelength| (from..to).contains(&f64::from(d.nm));
             let found: DVec3 = drawn().filter(inside).map(|d| d.weight.as_dvec3()).sum();
             let expected: DVec3 =
                 (from as u32..to as u32).map(|nm| density(f64::from(nm) + 0.5)).sum();
             let error = (found / f64::from(N) - expected).abs().max_element();
-            assert!(error < 1e-3, "{from} to {to}: {error}");
+            // Besides, one number at either end.
+            assert!(error < border + 2.0 * 3.0 / f64::from(N), "{from} to {to}: {error}");
         }
         for u in [0.0, 1.0_f32.next_down()] {
             let DrawnWavelength { nm, weight } = draw(u);
             assert!((380.0..=730.0).contains(&nm) && weight.min_element() >= 0.0, "{nm}");
-            assert!(weight.max_element() <= 3.0 + 1e-6);
+            // A share of a third, in f32.
+            assert!(weight.max_element() <= 3.0 * (1.0 + f32::EPSILON));
         }
     }
 
@@ -152,7 +159,7 @@ mod tests {
         };
         let hues: Vec<f64> = (45..64).map(|k| strongest(f64::from(10 * k))).collect();
         for pair in hues.windows(2) {
-            assert!(pair[1] <= pair[0] + 1e-9, "{hues:?}");
+            assert!(pair[1] <= pair[0], "{hues:?}");
         }
         assert!(hues[0] > 3.9 && hues[hues.len() - 1].abs() < 0.2, "from blue to red: {hues:?}");
     }

@@ -204,10 +204,11 @@ mod tests {
             (Water, 1.33340, 55.76),
         ] {
             let [f, d, c] = lines.map(|line| glass.curve(1.0).index(line));
-            assert!((d - n_d).abs() < 1e-5, "{glass:?}: {d}");
-            assert!((f64::from(index_at_d(9.0, Some(&glass))) - d).abs() < 1e-6);
+            // Half a unit of the last published digit, and the rounding to f32.
+            assert!((d - n_d).abs() <= 5e-6, "{glass:?}: {d}");
+            assert!((f64::from(index_at_d(9.0, Some(&glass))) / d - 1.0).abs() < 6e-8);
             let number = (d - 1.0) / (f - c);
-            assert!((number - abbe).abs() < 0.02, "{glass:?}: {number}");
+            assert!((number - abbe).abs() <= 5e-3, "{glass:?}: {number}");
             assert_eq!(glass.check(1.0), Ok(()));
         }
     }

@@ -3,13 +3,11 @@
 use super::path::{Arrival, Path, PathCounters, PathTracer};
 use crate::build::bvh::Hit;
 use crate::build::light::Receiver;
-use crate::build::nesting::Meeting;
 use crate::description::Rgb;
-use crate::extract::NOTHING;
-use crate::math::{Ray, offset_ray_origin};
+use crate::math::Ray;
 use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::medium::{Flight, HenyeyGreenstein, Medium};
-use crate::shade::nesting::{Inside, NestingFaults};
+use crate::shade::nesting::Inside;
 use glam::{DVec3, Vec2};
 
 impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
@@ -104,40 +102,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
     /// Share of the light which is left along a segment that begins inside `inside`: what holes let pass, times what
     /// is not absorbed or scattered on the way. Surfaces between equal indices are none.
     pub(super) fn transmitted(&self, shadow_ray: &Ray, end: f64, inside: &I) -> Rgb {
-        let (mut inside, mut faults) = (*inside, NestingFaults::default());
         let mut left = Rgb::ONE;
-        let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
-        let mut ray = *shadow_ray;
-        let materials = &self.scene.surfaces.materials;
-        while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
-            left *= self.left_after(&inside, hit.t * ray.d.as_dvec3().length());
-            let surface = match self.scene.nested().meet(&ray, hit, &mut inside, &mut faults) {
-                Meeting::Nothing { surface, beyond } => {
-                    inside = beyond;
-                    surface
-                }
-                Meeting::Surface { hit, surface, .. } => {
-                    let material = self.scene.geometry.instances[hit.instance as usize].material;
-                    if material == NOTHING || !materials.has_opacity(material) {
-                        return Rgb::ZERO;
-                    }
-                    let at = self.scene.geometry.texture_point(hit.instance, &surface, ray.time);
-                    left *= 1.0 - materials.opacity(material, &at);
-                    surface
-                }
-            };
-            if left == Rgb::ZERO {
-                return left;
-            }
-            ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
-            if end.is_finite() {
-                ray.d = (target - ray.o.as_dvec3()).as_vec3();
-                if ray.d.dot(shadow_ray.d) <= 0.0 {
-                    return left;
-                }
-            }
-        }
-        left * self.left_after(&inside, end * ray.d.as_dvec3().length())
+        let passed = self.passed(shadow_ray, end, inside, |inside, distance| {
+            left *= self.left_after(inside, distance);
+        });
+        left * passed
     }
 
     /// Share of light which is left after a distance in metres in what is around a path.

@@ -550,13 +550,25 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         if !OPACITY && !I::NESTS {
             return if self.scene.geometry.occluded(shadow_ray, end) { 0.0 } else { 1.0 };
         }
-        // Holes let a share of the light through, and surfaces inside of other solids all of it: follow the
-        // segment from surface to surface. What is found wrong is counted on the paths.
+        self.passed(shadow_ray, end, inside, |_, _| {})
+    }
+
+    /// Follows a segment from surface to surface: the share of the light that holes let through; surfaces inside of other
+    /// solids let all of it. `flown` is told what is around each part of the way, and its length in metres.
+    pub(super) fn passed(
+        &self,
+        shadow_ray: &Ray,
+        end: f64,
+        inside: &I,
+        mut flown: impl FnMut(&I, f64),
+    ) -> f32 {
+        // What is found wrong is counted on the paths.
         let (mut inside, mut faults) = (*inside, NestingFaults::default());
         let mut passed = 1.0;
         let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
         let mut ray = *shadow_ray;
         while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
+            flown(&inside, hit.t * ray.d.as_dvec3().length());
             let surface = match self.scene.nested().meet(&ray, hit, &mut inside, &mut faults) {
                 Meeting::Nothing { surface, beyond } => {
                     inside = beyond;
@@ -580,10 +592,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             if end.is_finite() {
                 ray.d = (target - ray.o.as_dvec3()).as_vec3();
                 if ray.d.dot(shadow_ray.d) <= 0.0 {
-                    break;
+                    return passed;
                 }
             }
         }
+        flown(&inside, end * ray.d.as_dvec3().length());
         passed
     }
 

@@ -117,8 +117,7 @@ fn turned(
     turns: &Turns,
     tolerance: f64,
 ) -> Result<(), TessellationError> {
-    let closed = capped || profile.open_ends == [None, None];
-    let outward = if closed && profile.volume < 0.0 { -1.0 } else { 1.0 };
+    let outward = profile.outward(capped);
     for piece in &profile.pieces {
         let ring = |u: f64| {
             let along = piece.direction(u) * outward;

@@ -2,6 +2,7 @@
 
 use super::Names;
 use super::decode::{Report, decode};
+use super::light;
 use super::limits;
 use super::motion::{self, Pose};
 use super::source::Cursor;
@@ -51,9 +52,9 @@ pub(super) fn read_entity(
             "keyframes" => entity.keyframes = motion::read_keyframes(&field, report),
             "shape" => entity.shape = surface::read_shape(&field, names, report),
             "material" => entity.material = decode(&field, report),
-            "emission" => entity.emission = surface::read_emission(&field, names, report),
+            "emission" => entity.emission = light::read_emission(&field, names, report),
             "two_sided" => two_sided = decode(&field, report),
-            "light" => entity.light = surface::read_light(&field, names, report),
+            "light" => entity.light = light::read_light(&field, names, report),
             "camera" => entity.camera = read_camera(&field, names, report),
             "hidden_from_camera" => {
                 entity.hidden_from_camera = decode(&field, report).unwrap_or_default();

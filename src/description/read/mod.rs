@@ -14,6 +14,7 @@ mod decode;
 mod entity;
 mod extrude;
 mod files;
+mod light;
 mod limits;
 mod motion;
 mod outline;

@@ -1,17 +1,16 @@
-//! Textures, materials, meshes and lights: their numbers, and the names they use.
+//! Textures, materials and meshes: their numbers, and the names they use.
 
 use super::Names;
 use super::decode::{Report, decode};
 use super::limits::{self, Limits};
 use super::profile::read_revolution;
 use super::source::Cursor;
-use crate::color::blackbody;
 use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
 use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
 use crate::description::{
-    Curve, Dispersion, Displacement, Emission, EmissionStrength, Light, Material, Relief, Rgb,
-    Shape, Texture, TriangleMesh, Value, Wave,
+    Curve, Dispersion, Displacement, Material, Relief, Rgb, Shape, Texture, TriangleMesh, Value,
+    Wave,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
@@ -161,21 +160,21 @@ pub(super) fn reference(
 }
 
 /// Checks the parameters of surfaces against limits and names.
-struct Parameters<'a, 'r> {
-    cursor: &'a Cursor<'a>,
-    names: &'a Names<'a>,
-    report: &'r mut Report,
+pub(super) struct Parameters<'a, 'r> {
+    pub(super) cursor: &'a Cursor<'a>,
+    pub(super) names: &'a Names<'a>,
+    pub(super) report: &'r mut Report,
 }
 
 impl Parameters<'_, '_> {
-    fn texture(&mut self, field: &Cursor, name: &str) {
+    pub(super) fn texture(&mut self, field: &Cursor, name: &str) {
         if self.names.complete {
             let defined = &self.names.textures;
             reference(self.report, field, name, defined, "texture", "textures");
         }
     }
 
-    fn color(&mut self, field: &str, value: &Value<Rgb, String>, limits: &Limits) {
+    pub(super) fn color(&mut self, field: &str, value: &Value<Rgb, String>, limits: &Limits) {
         let place = self.cursor.at(field);
         match value {
             Value::Constant(color) => {
@@ -195,7 +194,7 @@ impl Parameters<'_, '_> {
         }
     }
 
-    fn number(&mut self, field: &str, value: impl Into<f64>, limits: &Limits) {
+    pub(super) fn number(&mut self, field: &str, value: impl Into<f64>, limits: &Limits) {
         limits::number(self.report, &self.cursor.at(field), value, limits);
     }
 
@@ -210,7 +209,7 @@ impl Parameters<'_, '_> {
         limits::vector(self.report, &self.cursor.at(field), &uv, &limits::UV);
     }
 
-    fn rgb(&mut self, field: &str, value: Rgb, limits: &Limits) {
+    pub(super) fn rgb(&mut self, field: &str, value: Rgb, limits: &Limits) {
         limits::color(self.report, &self.cursor.at(field), value, limits);
     }
 
@@ -625,85 +624,4 @@ pub(super) fn read_shape(
         }
     }
     Some(shape)
-}
-
-/// The strength of an emitting shape as a scene file says it.
-#[derive(Debug, Deserialize)]
-#[serde(rename = "emission", deny_unknown_fields)]
-enum EmissionFile {
-    Radiance(Value<Rgb, String>),
-    Power(Rgb),
-    /// The colour of a blackbody, and its luminance in units of radiance.
-    Temperature {
-        kelvin: f64,
-        radiance: f32,
-    },
-}
-
-/// Reads the strength of an emitting shape and checks it.
-pub(super) fn read_emission(
-    cursor: &Cursor,
-    names: &Names,
-    report: &mut Report,
-) -> Option<Emission<String>> {
-    let place = cursor.nth(0);
-    let strength = match decode(cursor, report)? {
-        EmissionFile::Radiance(radiance) => EmissionStrength::Radiance(radiance),
-        EmissionFile::Power(power) => EmissionStrength::Power(power),
-        EmissionFile::Temperature { kelvin, radiance } => {
-            let fine = limits::number(report, &cursor.at("kelvin"), kelvin, &limits::TEMPERATURE)
-                & limits::number(report, &cursor.at("radiance"), radiance, &limits::STRENGTH);
-            let color = if fine { blackbody(kelvin) * radiance } else { Rgb::ZERO };
-            EmissionStrength::Radiance(color.into())
-        }
-    };
-    match &strength {
-        EmissionStrength::Power(power) => {
-            limits::color(report, &place, *power, &limits::STRENGTH);
-        }
-        EmissionStrength::Radiance(Value::Constant(radiance)) => {
-            limits::color(report, &place, *radiance, &limits::STRENGTH);
-        }
-        EmissionStrength::Radiance(Value::Texture(name)) => {
-            Parameters { cursor, names, report }.texture(&place, name);
-        }
-    }
-    Some(Emission { strength, two_sided: false })
-}
-
-/// Reads a light without a shape and checks it.
-pub(super) fn read_light(
-    cursor: &Cursor,
-    names: &Names,
-    report: &mut Report,
-) -> Option<Light<String>> {
-    let light: Light<String> = decode(cursor, report)?;
-    let mut check = Parameters { cursor, names, report };
-    match &light {
-        Light::Point { intensity, power } => {
-            for (field, strength) in [("intensity", intensity), ("power", power)] {
-                if let Some(strength) = strength {
-                    check.rgb(field, *strength, &limits::STRENGTH);
-                }
-            }
-            if intensity.is_some() == power.is_some() {
-                let message = "a `Point` needs exactly one of `intensity` and `power`";
-                check.report.at("scene::conflict", cursor, message);
-            }
-        }
-        Light::Spot { intensity, angle, blend } => {
-            check.rgb("intensity", *intensity, &limits::STRENGTH);
-            check.number("angle", *angle, &limits::CONE);
-            check.number("blend", *blend, &limits::SHARE);
-        }
-        Light::Directional { irradiance, angle } => {
-            check.rgb("irradiance", *irradiance, &limits::STRENGTH);
-            check.number("angle", *angle, &limits::DIAMETER);
-        }
-        Light::Sky { radiance, scale } => {
-            check.color("radiance", radiance, &limits::STRENGTH);
-            check.number("scale", *scale, &limits::STRENGTH);
-        }
-    }
-    Some(light)
 }

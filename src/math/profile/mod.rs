@@ -132,6 +132,13 @@ impl Profile {
         2.0 * ROUNDINGS * radius.max(low.abs()).max(high.abs())
     }
 
+    /// 1 if the outside of its surface is to the right of the way along the profile, −1 if to the left; `capped`: its ends
+    /// are closed by disks.
+    pub fn outward(&self, capped: bool) -> f64 {
+        let closed = capped || self.open_ends == [None, None];
+        if closed && self.volume < 0.0 { -1.0 } else { 1.0 }
+    }
+
     /// Area of the surface, without ends.
     pub fn area(&self) -> f64 {
         self.areas[self.pieces.len()]

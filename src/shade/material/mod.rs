@@ -281,7 +281,7 @@ impl MaterialTable {
     pub fn is_invisible(&self, material: u32, outside: Option<u32>) -> bool {
         let Compiled { kind, disperses, .. } = &self.materials[material as usize];
         let Kind::Dielectric { eta, width: Width::Smooth, .. } = kind else { return false };
-        let around = outside.map_or(1.0, |outside| self.index(outside, 0.0));
+        let around = outside.and_then(|outside| self.interior(outside)).map_or(1.0, |i| i.ior);
         !disperses && outside.is_none_or(|outside| !self.disperses(outside)) && *eta == around
     }
 

@@ -44,8 +44,7 @@ impl Revolution {
 
     /// 1 if the outside is to the right of the way along the profile, −1 if to the left.
     fn outward(&self) -> f64 {
-        let closed = self.capped || self.profile.open_ends == [None, None];
-        if closed && self.profile.volume < 0.0 { -1.0 } else { 1.0 }
+        self.profile.outward(self.capped)
     }
 
     fn cap_area(&self, end: usize) -> f64 {
