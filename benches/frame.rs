@@ -5,7 +5,7 @@ mod common;
 use bevy_ecs::prelude::*;
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{DVec3, Vec3};
-use kinora::description::{Attenuation, EmissionStrength, RenderSettings};
+use kinora::description::{Attenuation, EmissionStrength, RenderSettings, Rgb};
 use kinora::frame::{RenderControl, Simulation};
 use kinora::world::{Camera, Emission, MadeOf, Material, Settings, Shape, Velocity};
 use std::hint::black_box;
@@ -117,6 +117,7 @@ fn features(c: &mut Criterion) {
         roughness: 0.0.into(),
         attenuation,
         scattering: None,
+        emission: Rgb::ZERO,
         priority: 0,
     };
     let amber = Attenuation { color: Vec3::new(0.9, 0.6, 0.2), distance: 0.2 };

@@ -6,7 +6,7 @@ use common::Uniforms;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec2, Vec3};
 use kinora::description::{
-    Channel, Encoding, ImageData, ImagePixels, Material, Metal, Texture, TextureFilter,
+    Channel, Encoding, ImageData, ImagePixels, Material, Metal, Rgb, Texture, TextureFilter,
     TextureFiltering, Wrap,
 };
 use kinora::shade::{MaterialTable, Pyramids, TexturePoint, Textures, TransportMode};
@@ -31,6 +31,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
         roughness: roughness.into(),
         attenuation: None,
         scattering: None,
+        emission: Rgb::ZERO,
         priority: 0,
     };
     vec![

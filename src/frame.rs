@@ -5,7 +5,7 @@ use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
 use crate::extract::{
-    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Requirements,
+    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Method, Requirements,
     Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError};
@@ -119,12 +119,12 @@ pub enum RenderError {
         /// What the system answered.
         source: TryReserveError,
     },
-    /// Photons in a medium.
+    /// What glows is to be lit by photons.
     #[error(
-        "{0} knows nothing of solids which scatter light (`scattering`): set `integrator: Path` without \
-         `caustics: Photons`, or `Auto`"
+        "{0} has no photons from solids which glow inside (`emission` of a material): set \
+         `integrator: Path`, or `Auto`"
     )]
-    Scattering(&'static str),
+    GlowingSolids(&'static str),
     /// A mesh that is divided for the camera would take too much memory.
     #[error(
         "dicing the mesh `{mesh}` takes at least {triangles} triangles, {megabytes} MB, and \
@@ -293,9 +293,10 @@ impl Simulation {
             return Err(RenderError::Dangling(first));
         }
         let method = self.world.resource::<ChosenIntegrator>().method;
-        if method.has_photons() && self.world.resource::<Requirements>().has(Feature::Scattering) {
+        let glows = self.world.resource::<Requirements>().has(Feature::GlowingSolids);
+        if glows && matches!(method, Method::Sppm | Method::PhotonMap) {
             self.world.resource_mut::<Instances>().mark_unseen();
-            return Err(RenderError::Scattering(method.name()));
+            return Err(RenderError::GlowingSolids(method.name()));
         }
         if let Some(refusal) = self.world.resource::<DicingRefused>().0.clone() {
             let name = self.world.get::<Name>(refusal.mesh);

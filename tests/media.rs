@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{render, scene};
+use common::{render, render_description, scene};
 use kinora::frame::{RenderError, Simulation};
 
 /// Fog as a solid without a surface of its own: index 1.
@@ -14,7 +14,7 @@ fn fog(sigma_s: f64, sigma_a: f64, g: f64) -> String {
         String::new()
     };
     format!(
-        "Dielectric(ior: 1, scattering: (coefficient: ({sigma_s}, {sigma_s}, {sigma_s}), g: {g}){absorbed})"
+        "Dielectric(ior: 1, scattering: (coefficient: ({sigma_s}, {sigma_s}, {sigma_s}), phase: HenyeyGreenstein({g})){absorbed})"
     )
 }
 
@@ -37,7 +37,7 @@ fn nothing_is_lost_where_nothing_is_absorbed() {
                 "sky": (light: Sky(radiance: 1))"#
             ),
         );
-        render(&text, (8, 8), 1024).mean().assert_agrees(&format!("{sigma} {g}"), 1.0, 2e-3);
+        render(&text, (8, 8), 2048).mean().assert_agrees(&format!("{sigma} {g}"), 1.0, 2e-3);
     }
 }
 
@@ -87,6 +87,48 @@ fn light_is_scattered_once_as_the_airlight_integral_says() {
     }
 }
 
+/// Fog in two boxes which touch is fog in one: what flies through both draws anew in the second. Almost all is absorbed.
+#[test]
+fn fog_behind_fog_is_thicker() {
+    let text = in_fog(
+        "",
+        &fog(1e-6, 1.0, 0.0),
+        r#""camera": (transform: (translation: (0, 0, 4), look_at: (0, 0, 0)), camera: (orthographic: Some(0.1))),
+        "near": (transform: (translation: (0, 0, 0.5)), shape: Box(size: (9, 9, 1)), material: "fog"),
+        "far": (transform: (translation: (0, 0, -0.5)), shape: Box(size: (9, 9, 1)), material: "fog"),
+        "sky": (light: Sky(radiance: 1))"#,
+    );
+    let expected = (-2.0_f64).exp();
+    render(&text, (16, 16), 1024).mean().assert_agrees("2 m", expected, 5e-3);
+}
+
+/// What glows is as bright as it is deep, less what it absorbs (closed form `ε·(1 − exp(−σd))/σ`); where it scatters
+/// without absorbing, all of it comes out: the flux through a border, seen from everywhere, is that of its volume.
+#[test]
+fn media_glow() {
+    let slab = |fog: &str| {
+        in_fog(
+            "",
+            fog,
+            r#""camera": (transform: (translation: (0, 0, 4), look_at: (0, 0, 0)), camera: (orthographic: Some(0.1))),
+            "flame": (shape: Box(size: (9, 9, 3)), material: "fog")"#,
+        )
+    };
+    let absorbs = "Dielectric(ior: 1, emission: (2, 2, 2), attenuation: (color: (0.60653066, 0.60653066, 0.60653066)))";
+    let seen = render(&slab(absorbs), (4, 4), 4).mean();
+    seen.assert_agrees("absorbing", 3.107_479_4, 1e-6);
+    // By symmetry a ball which scatters looks the same from everywhere: its mean over the disk that is seen, times π·πR²·4
+    // is the flux 4π·ε·4πR³/3.
+    let ball = in_fog(
+        "roulette_depth: 2000, max_depth: 2000",
+        "Dielectric(ior: 1, emission: (2, 2, 2), scattering: (coefficient: (1.5, 1.5, 1.5), phase: HenyeyGreenstein(0.3)))",
+        r#""camera": (transform: (translation: (0, 0, 4), look_at: (0, 0, 0)), camera: (orthographic: Some(2))),
+        "flame": (shape: Sphere(radius: 1), material: "fog")"#,
+    );
+    let expected = 2.0 * 4.0 / 3.0 * std::f64::consts::FRAC_PI_4;
+    render(&ball, (16, 16), 1024).mean().assert_agrees("scattering", expected, 3e-3);
+}
+
 /// Beer and Lambert, channel by channel, of light on a wall which comes and is seen through coloured air: its borders are
 /// none, for the sun as well.
 #[test]
@@ -112,25 +154,95 @@ fn borders_between_equal_indices_are_no_surfaces() {
     assert_eq!(render(&text(""), (4, 4), 16).mean_of_channels(), [0.0; 3]);
 }
 
-/// Methods which trace photons say what they do not know, and `Auto` takes another.
+/// Mean over the pictures of several seeds and its standard error. Pixels share photons: only pictures tell how far their
+/// means are off.
+fn mean_of_seeds(text: &str, size: (u32, u32), samples: u32) -> (f64, f64) {
+    let mut described = scene(text);
+    (described.render.size, described.render.samples) = (size, samples);
+    let means: Vec<f64> = (0..6)
+        .map(|seed| {
+            described.render.seed = seed;
+            render_description(&described, 0).mean().mean
+        })
+        .collect();
+    let n = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / n;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+/// Photons lose nothing either where nothing is absorbed: a ball of fog under white light, seen through its middle.
+/// What photons there are lies beside the ray as on it, so that the disks over which they are gathered make no difference.
 #[test]
-fn photons_in_media_are_refused_in_words() {
+fn photons_lose_nothing_where_nothing_is_absorbed() {
+    for (integrator, sigma, phase) in [
+        ("Sppm", 1.0, "HenyeyGreenstein(0.5)"),
+        ("PhotonMap, photons: (per_pass: Some(262144))", 2.0, "Isotropic"),
+        ("Sppm, photons: (direct: Photons)", 2.0, "Rayleigh"),
+    ] {
+        let text = in_fog(
+            "max_depth: 2000",
+            &format!("Dielectric(ior: 1, scattering: (coefficient: ({sigma}, {sigma}, {sigma}), phase: {phase}))"),
+            r#""camera": (transform: (translation: (0, 0, 4), look_at: (0, 0, 0)), camera: (orthographic: Some(0.6))),
+            "cloud": (shape: Sphere(radius: 1), material: "fog"),
+            "sky": (light: Sky(radiance: 1))"#,
+        )
+        .replace("integrator: Path", &format!("integrator: {integrator}"));
+        let (mean, error) = mean_of_seeds(&text, (16, 16), 32);
+        println!("{integrator}: {mean} ± {error}");
+        assert!(error < 0.01 && (mean - 1.0).abs() < 4.0 * error, "{integrator}: {mean} ± {error}");
+    }
+}
+
+/// All methods see the same fog: a lamp and a ball of glass in it, which throws a caustic into it, and a floor.
+#[test]
+fn photons_and_paths_see_the_same_fog() {
+    let text = in_fog(
+        "roulette_depth: 4, max_depth: 30",
+        &fog(0.5, 0.1, 0.4),
+        r#""camera": (transform: (translation: (0, 1, 5), look_at: (0, 0.2, 0)), camera: (fov: 40)),
+        "air": (shape: Box(size: (6, 6, 12)), material: "fog"),
+        "floor": (transform: (translation: (0, -1, 0), rotation: (-90, 0, 0)), shape: Rectangle(size: (8, 8)), material: "grey"),
+        "ball": (transform: (translation: (0, 0.2, 0)), shape: Sphere(radius: 0.6), material: "glass"),
+        "lamp": (transform: (translation: (0.5, 2, 0)), shape: Sphere(radius: 0.5), emission: Radiance((9, 8, 6)))"#,
+    )
+    .replace(r#""black":"#, r#""grey": Diffuse(albedo: 0.5), "glass": Dielectric(ior: 1.5, priority: 1), "black":"#);
+    let paths = mean_of_seeds(&text, (20, 20), 128);
+    for (integrator, samples) in [
+        ("Path, caustics: Photons", 64),
+        ("Sppm, photons: (per_pass: Some(16384))", 32),
+        ("PhotonMap, photons: (per_pass: Some(262144))", 8),
+        ("PhotonMap, final_gather: 4, photons: (per_pass: Some(262144))", 8),
+    ] {
+        let text = text.replace("integrator: Path", &format!("integrator: {integrator}"));
+        let photons = mean_of_seeds(&text, (20, 20), samples);
+        println!("{integrator} {photons:?} {paths:?}");
+        let error = photons.1.hypot(paths.1);
+        assert!(error < 0.015 * paths.0, "{integrator}: ± {error}");
+        let difference = (photons.0 - paths.0).abs();
+        assert!(difference < 4.0 * error + 0.01 * paths.0, "{integrator}: {photons:?}, {paths:?}");
+    }
+}
+
+/// No photons start inside what glows: methods which have all light from them say so, and `Auto` takes another.
+#[test]
+fn photons_of_what_glows_are_refused_in_words() {
     let text = |integrator: &str| {
         in_fog(
             "",
-            &fog(1.0, 0.0, 0.0),
+            "Dielectric(ior: 1, emission: (1, 0.5, 0.1))",
             r#""camera": (transform: (translation: (0, 0, 4)), camera: ()),
-            "cloud": (shape: Sphere(), material: "fog"), "sky": (light: Sky(radiance: 1))"#,
+            "flame": (shape: Sphere(), material: "fog")"#,
         )
         .replace("integrator: Path", &format!("integrator: {integrator}"))
     };
-    for integrator in ["Sppm", "PhotonMap", "Path, caustics: Photons"] {
+    for integrator in ["Sppm", "PhotonMap"] {
         let told = Simulation::from_description(&scene(&text(integrator))).prepare_frame(0);
-        let told = told.expect_err("it knows no media");
-        assert!(matches!(told, RenderError::Scattering(_)), "{told}");
+        let told = told.expect_err("there are no such photons");
+        assert!(matches!(told, RenderError::GlowingSolids(_)), "{told}");
         assert!(told.to_string().contains("`integrator: Path`"), "{told}");
     }
-    for integrator in ["Path", "Auto"] {
+    for integrator in ["Path", "Path, caustics: Photons", "Auto"] {
         let frame = Simulation::from_description(&scene(&text(integrator))).prepare_frame(0);
         assert!(frame.is_ok(), "{integrator}");
     }

@@ -43,6 +43,9 @@ pub enum Material<R> {
         /// Scattering inside; `None`: light goes straight on.
         #[serde(default)]
         scattering: Option<Scattering>,
+        /// What the inside emits per metre, W·m⁻³·sr⁻¹.
+        #[serde(default)]
+        emission: Rgb,
         /// Where solids overlap, the one of the highest priority is there; the surface of another is
         /// not seen inside it. Among equal ones the solid that the scene names first wins.
         #[serde(default)]
@@ -177,14 +180,27 @@ impl Attenuation {
 }
 
 /// How a solid scatters light inside, evenly everywhere.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scattering {
     /// Scattering coefficient per metre and channel.
     pub coefficient: Rgb,
-    /// Mean cosine of the deflection, in (−1, 1) (Henyey and Greenstein).
+    /// Into which directions.
     #[serde(default)]
-    pub g: f32,
+    pub phase: PhaseFunction,
+}
+
+/// How light that a medium scatters is spread over directions: a density per steradian by the angle of deflection.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+pub enum PhaseFunction {
+    /// Evenly.
+    #[default]
+    Isotropic,
+    /// By the mean cosine of the deflection, in (−1, 1): 0 is isotropic, positive is forwards (Henyey and Greenstein 1941,
+    /// "Diffuse radiation in the Galaxy", Astrophysical Journal 93).
+    HenyeyGreenstein(f32),
+    /// As what is much smaller than the wavelength does, `3/16π·(1 + cos²)`.
+    Rayleigh,
 }
 
 /// A metal with measured indices of refraction.
@@ -219,16 +235,23 @@ impl<R> Material<R> {
             Self::Mirror { reflectance } => {
                 Material::Mirror { reflectance: reflectance.map_ref(textures)? }
             }
-            Self::Dielectric { ior, dispersion, roughness, attenuation, scattering, priority } => {
-                Material::Dielectric {
-                    ior,
-                    dispersion,
-                    roughness: roughness.map_ref(textures)?,
-                    attenuation,
-                    scattering,
-                    priority,
-                }
-            }
+            Self::Dielectric {
+                ior,
+                dispersion,
+                roughness,
+                attenuation,
+                scattering,
+                emission,
+                priority,
+            } => Material::Dielectric {
+                ior,
+                dispersion,
+                roughness: roughness.map_ref(textures)?,
+                attenuation,
+                scattering,
+                emission,
+                priority,
+            },
             Self::ThinGlass { ior, tint } => {
                 Material::ThinGlass { ior, tint: tint.map_ref(textures)? }
             }

@@ -22,7 +22,7 @@ pub use camera::{Camera, Focus, SENSOR_HEIGHT};
 pub use diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
 pub use dispersion::{D_LINE, Dispersion, DispersionError, IndexCurve, index_at_d};
 pub use light::{Emission, EmissionStrength, Light};
-pub use material::{Attenuation, Green, Material, Metal, Scattering};
+pub use material::{Attenuation, Green, Material, Metal, PhaseFunction, Scattering};
 pub use motion::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };

@@ -120,12 +120,14 @@ impl Facts<'_> {
     }
 }
 
-/// Whether the integrator knows all that the frame requires: photons are not scattered in solids.
+/// Whether the integrator knows all that the frame requires: no photons start inside what glows, and `Sppm` and
+/// `PhotonMap` have all that it lights from them.
 pub(crate) fn method_suffices(
     chosen: Res<ChosenIntegrator>,
     requirements: Res<Requirements>,
 ) -> bool {
-    !(chosen.method.has_photons() && requirements.has(Feature::Scattering))
+    let by_photons = matches!(chosen.method, Method::Sppm | Method::PhotonMap);
+    !(by_photons && requirements.has(Feature::GlowingSolids))
 }
 
 /// Writes [`ChosenIntegrator`] when it is different from before.
@@ -151,12 +153,13 @@ pub fn choose_integrator(
         (IntegratorChoice::Path, Caustics::Photons) => (Method::PathWithPhotons, None),
         (IntegratorChoice::PhotonMap, _) => (Method::PhotonMap, None),
         (IntegratorChoice::Sppm, _) => (Method::Sppm, None),
-        (IntegratorChoice::Auto, _) if requirements.has(Feature::Scattering) => {
-            (Method::Path, Some("photons are not scattered in solids".to_owned()))
-        }
         (IntegratorChoice::Auto, _) => {
             let min_alpha = settings.photons.min_alpha();
-            let casts = |material| surfaces.materials.may_cast_caustics(material, min_alpha);
+            let materials = &surfaces.materials;
+            let casts = |material| {
+                !materials.is_invisible(material, None)
+                    && materials.may_cast_caustics(material, min_alpha)
+            };
             let noise = if caustics {
                 caustic_noise(&instances, &lights.0, &emissions, &surfaces, &mut means, casts)
             } else {

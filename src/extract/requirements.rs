@@ -4,7 +4,7 @@ use super::{
     Instances, Meshes, NOTHING, PunctualLight, PunctualLights, Surfaces, ViewCamera, may_enclose,
     overlapping_pairs, solids,
 };
-use crate::description::Light;
+use crate::description::{Light, Rgb};
 use crate::math::Aabb;
 use crate::shade::MaterialTable;
 use crate::world::{Deformation, Name, Settings, Shape, ShutterMotion, VertexMotion};
@@ -30,13 +30,15 @@ pub enum Feature {
     NestedDielectrics,
     /// Solids whose index of refraction depends on the wavelength: paths must know theirs, and what they are inside of.
     Dispersion,
-    /// Solids which scatter light inside.
+    /// Solids which scatter light inside, or glow.
     Scattering,
+    /// Solids which glow inside.
+    GlowingSolids,
     /// Smooth solids of index 1, such as fog: what is inside matters, and their surfaces are none.
     InvisibleSurfaces,
     /// Light from all around.
     Sky,
-    /// Light which reaches diffuse surfaces through mirrors or glass.
+    /// Light which reaches diffuse surfaces or media through mirrors or glass.
     Caustics,
 }
 
@@ -69,6 +71,7 @@ pub struct Census {
     solid: usize,
     dispersive: usize,
     scattering: usize,
+    glowing: usize,
     invisible: usize,
     /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
@@ -91,8 +94,10 @@ impl Census {
             census.absorbing += if materials.attenuation(material).is_some() { count } else { 0 };
             census.solid += if materials.is_dielectric(material) { count } else { 0 };
             census.dispersive += if materials.disperses(material) { count } else { 0 };
-            let scatters = materials.medium(material).is_some();
-            census.scattering += if scatters { count } else { 0 };
+            let medium = materials.medium(material);
+            census.scattering += if medium.is_some() { count } else { 0 };
+            let glows = medium.is_some_and(|medium| medium.emission != Rgb::ZERO);
+            census.glowing += if glows { count } else { 0 };
             let invisible = materials.is_invisible(material, None);
             census.invisible += if invisible { count } else { 0 };
             let specular = !invisible && materials.may_cast_caustics(material, min_alpha);
@@ -172,8 +177,12 @@ pub fn derive_requirements(
         require(Feature::Dispersion, reason);
     }
     if census.scattering > 0 {
-        let reason = format!("{} solids which scatter light", census.scattering);
+        let reason = format!("{} solids which scatter light or glow", census.scattering);
         require(Feature::Scattering, reason);
+    }
+    if census.glowing > 0 {
+        let reason = format!("{} solids which glow inside", census.glowing);
+        require(Feature::GlowingSolids, reason);
     }
     if census.invisible > 0 {
         let reason = format!("{} smooth solids of index 1", census.invisible);
@@ -183,7 +192,7 @@ pub fn derive_requirements(
     if skies > 0 {
         require(Feature::Sky, format!("{skies} sky lights"));
     }
-    if census.specular > 0 && census.storable > 0 {
+    if census.specular > 0 && census.storable + census.scattering > 0 {
         let reason = format!("{} mirrors, clear or polished objects", census.specular);
         require(Feature::Caustics, reason);
     }

@@ -20,12 +20,15 @@
 //! Using Photon Mapping*, section 9.2.2; Christensen 1999, "Faster Photon Map Global Illumination",
 //! Journal of Graphics Tools 4(3)).
 
+use super::eye_medium::Crossing;
 use super::path::{Arrival, PathCounters, PathTracer};
 use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
 use crate::build::nesting::Meeting;
-use crate::build::photon::{IrradianceMap, KnownIrradiance, PhotonMap, QueryPoint, least_radius};
+use crate::build::photon::{
+    IrradianceMap, KnownIrradiance, PhotonMap, QueryPoint, VolumeMap, least_radius,
+};
 use crate::description::{DirectLight, PhotonSettings, Rgb};
 use crate::extract::{CameraRay, Method, NOTHING};
 use crate::film::PixelSample;
@@ -35,6 +38,7 @@ use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
+use std::ops::ControlFlow;
 
 /// How much wider photons are gathered at points which the camera sees by a diffuse bounce: the
 /// bounce blurs what is found there anyway.
@@ -52,6 +56,9 @@ pub(super) struct Maps<'a> {
     pub caustics: &'a PhotonMap,
     /// Where the irradiance of `global` is known beforehand.
     pub irradiance: &'a IrradianceMap,
+    /// Photons in media: all, and caustics where they are kept apart.
+    pub volume: &'a VolumeMap,
+    pub volume_caustics: &'a VolumeMap,
 }
 
 /// Follows camera paths for the methods with photons.
@@ -130,7 +137,7 @@ impl Gathered {
 
 /// What the path has met since its last diffuse surface.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Since {
+pub(super) enum Since {
     /// There was none: only specular surfaces so far.
     Never,
     /// It was the last surface.
@@ -141,35 +148,35 @@ enum Since {
 
 /// A path on its way.
 #[derive(Clone, Copy)]
-struct Walk<I> {
-    ray: Ray,
+pub(super) struct Walk<I> {
+    pub(super) ray: Ray,
     /// What of the scene the path stands for.
-    cone: Cone,
-    throughput: Rgb,
+    pub(super) cone: Cone,
+    pub(super) throughput: Rgb,
     eta_scale: f32,
-    arrival: Arrival,
-    since: Since,
-    inside: I,
-    depth: u32,
-    met: u32,
+    pub(super) arrival: Arrival,
+    pub(super) since: Since,
+    pub(super) inside: I,
+    pub(super) depth: u32,
+    pub(super) met: u32,
     /// Length of the path, metres.
-    length: f64,
+    pub(super) length: f64,
     /// Whether it belongs to a final gathering.
-    reads: bool,
+    pub(super) reads: bool,
     /// Whether it only looks for a light.
-    last: bool,
+    pub(super) last: bool,
     /// Whether it may still be split in two at a surface of glass.
     whole: bool,
 }
 
 /// What goes along with all walks of a sample.
-struct Context<'a> {
+pub(super) struct Context<'a> {
     key: SampleKey,
     camera_ray: &'a CameraRay,
     first_disk: FirstDisk,
-    counters: &'a mut PathCounters,
+    pub(super) counters: &'a mut PathCounters,
     gathered: Gathered,
-    sample: PixelSample,
+    pub(super) sample: PixelSample,
     distances: Vec<f32>,
 }
 
@@ -216,18 +223,32 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     }
 
     fn walk(&self, mut walk: Walk<I>, sampler: &Sampler, context: &mut Context) {
-        while let Some(hit) = self.advance(&mut walk, context) {
+        while let ControlFlow::Continue(hit) = self.advance(&mut walk, sampler, context) {
+            let Some(hit) = hit else { continue };
             if !self.interact(&mut walk, &hit, sampler, context) {
                 return;
             }
         }
     }
 
-    /// The next surface; adds light from infinity where there is none.
-    fn advance(&self, walk: &mut Walk<I>, context: &mut Context) -> Option<Hit> {
+    /// The next surface, or nothing where the path was scattered on the way; adds light from infinity where it ends
+    /// there.
+    fn advance(
+        &self,
+        walk: &mut Walk<I>,
+        sampler: &Sampler,
+        context: &mut Context,
+    ) -> ControlFlow<(), Option<Hit>> {
         context.counters.rays += 1;
-        let from_camera = walk.met == 0;
+        let from_camera = walk.depth == 0;
         let hit = self.path.scene.geometry.closest_hit(&walk.ray, f64::INFINITY, from_camera);
+        if I::SCATTERS && self.path.medium(&walk.inside).is_some() {
+            match self.cross(walk, hit.as_ref(), sampler, context) {
+                Crossing::Through => {}
+                Crossing::Scattered => return ControlFlow::Continue(None),
+                Crossing::Ended => return ControlFlow::Break(()),
+            }
+        }
         if I::NESTS && hit.is_none() {
             self.path.scene.nested().escape(&walk.inside, &mut context.counters.nesting);
         }
@@ -235,7 +256,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             let light = self.path.infinite(&walk.ray, walk.arrival);
             context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
         }
-        hit
+        hit.map_or(ControlFlow::Break(()), |hit| ControlFlow::Continue(Some(hit)))
     }
 
     /// Everything at one surface; whether the path goes on.
@@ -249,7 +270,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let scene = &self.path.scene;
         walk.length += hit.t;
         walk.cone.advance(hit.t);
-        if I::ABSORBS {
+        if I::ABSORBS && !(I::SCATTERS && self.path.medium(&walk.inside).is_some()) {
             walk.throughput *= self.path.transmittance(&walk.inside, hit.t);
         }
         let counters = &mut context.counters.nesting;
@@ -262,6 +283,8 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
                     let SurfacePoint { p, p_error, ng, .. } = surface;
                     walk.ray.o = offset_ray_origin(p, p_error, ng, walk.ray.d);
                     walk.inside = beyond;
+                    // The next flight has numbers of its own.
+                    walk.met += u32::from(I::SCATTERS);
                     return true;
                 }
             };
@@ -334,7 +357,13 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         if walk.last {
             return true;
         }
-        let u = || roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
+        self.survives(walk, || {
+            roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE))
+        })
+    }
+
+    /// Russian roulette by a number in `[0, 1)`: whether the path goes on.
+    pub(super) fn survives(&self, walk: &mut Walk<I>, u: impl FnOnce() -> f32) -> bool {
         if walk.depth >= self.path.roulette_depth {
             let carried = (walk.throughput * walk.eta_scale).max_element();
             let survival = (carried * self.path.roulette_gain).min(1.0);

@@ -1,17 +1,108 @@
 //! Paths through media which scatter light.
+//!
+//! Light that is scattered once towards a path is looked for at two distances: where the path itself scatters, and
+//! where a light may be near. The second is drawn evenly by the angle under which a light sees the path
+//! ([`Equiangular`]), the light chosen for a place on the path at random; for one infinitely far away it is drawn by what the medium
+//! scatters before the end. Whichever light was chosen, the two densities and that of the phase function share the
+//! light by the power heuristic, so that each finds what it is good at: lamps near by, thick fog, large lamps.
 
 use super::path::{Arrival, Path, PathCounters, PathTracer};
 use crate::build::bvh::Hit;
-use crate::build::light::Receiver;
+use crate::build::light::{Pivot, Receiver};
 use crate::description::Rgb;
 use crate::math::Ray;
-use crate::sampling::{Sampler, dimension, power_heuristic};
-use crate::shade::medium::{Flight, HenyeyGreenstein, Medium};
+use crate::sampling::{Equiangular, Sampler, dimension};
+use crate::shade::medium::{Flight, Medium, ScatteredBefore};
 use crate::shade::nesting::Inside;
-use glam::{DVec3, Vec2};
+use glam::{DVec3, Vec2, Vec3};
+
+/// A way through a medium.
+#[derive(Clone, Copy)]
+pub(super) struct Stretch<'s, I> {
+    pub(super) medium: Medium,
+    /// What goes through it, from its beginning.
+    pub(super) ray: &'s Ray,
+    /// Its length, metres.
+    pub(super) end: f64,
+    pub(super) inside: &'s I,
+    /// Which vertex comes next: the numbers of the flight follow from it.
+    pub(super) met: u32,
+}
+
+/// What became of a path on a stretch.
+pub(super) enum Flown {
+    /// It got to the end, and this is left of it.
+    Through(Rgb),
+    Scattered(Deflection),
+    Ended,
+}
+
+/// A path is scattered in a medium.
+pub(super) struct Deflection {
+    /// Where, in render space.
+    pub(super) p: DVec3,
+    /// How far along the stretch, metres.
+    pub(super) t: f64,
+    /// The new unit direction, and its density.
+    pub(super) wi: Vec3,
+    pub(super) pdf: f32,
+    /// What the throughput is multiplied by.
+    pub(super) weight: Rgb,
+    pub(super) arrival: Arrival,
+}
+
+/// How distances are drawn at which a light is looked for.
+#[derive(Clone, Copy)]
+pub(super) enum Aimed {
+    Towards(Equiangular),
+    Before(ScatteredBefore),
+}
+
+impl Aimed {
+    fn sample(&self, u: f64) -> f64 {
+        match self {
+            Self::Towards(lamp) => lamp.sample(u),
+            Self::Before(end) => end.sample(u),
+        }
+    }
+
+    fn pdf(&self, t: f64) -> f64 {
+        match self {
+            Self::Towards(lamp) => lamp.pdf(t),
+            Self::Before(end) => end.pdf(t),
+        }
+    }
+}
+
+/// Densities, per metre, with which two ways draw one distance, and whether the phase function goes on from there after
+/// the first of them.
+#[derive(Clone, Copy)]
+pub(super) struct Ways {
+    pub(super) flown: f64,
+    pub(super) aimed: f64,
+    pub(super) goes_on: bool,
+}
+
+impl Ways {
+    /// By how much the second way makes light likelier to be found: the root of the sum of squares, over the first.
+    fn together(&self) -> f32 {
+        1.0_f64.hypot(self.aimed / self.flown) as f32
+    }
+
+    /// The weight of light at a distance drawn with the density `own`, over `own`.
+    fn share(&self, own: f64, light_pdf: Option<f32>, phase_pdf: f32) -> f32 {
+        let square = |x: f64| x * x;
+        let (flown, aimed) = (self.flown / own, self.aimed / own);
+        let by_phase = match light_pdf {
+            Some(light_pdf) if self.goes_on => flown * f64::from(phase_pdf) / f64::from(light_pdf),
+            _ => 0.0,
+        };
+        (1.0 / (square(flown) + square(aimed) + square(by_phase)) / own) as f32
+    }
+}
 
 impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
-    /// The medium around a path, if it scatters.
+    /// The medium around a path, if it scatters or glows.
     #[inline]
     pub(super) fn medium(&self, inside: &I) -> Option<Medium> {
         self.scene.surfaces.materials.medium(inside.medium())
@@ -19,8 +110,6 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
 
     /// Lets a path fly through the medium around it to what it would hit. `None` where it gets there; else it has
     /// scattered, and this is whether it goes on.
-    ///
-    /// At a point of the medium it does what it does at a surface, with the phase function in place of the BSDF.
     pub(super) fn fly<const SHARE: bool>(
         &self,
         path: &mut Path<'a, I>,
@@ -29,73 +118,174 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         counters: &mut PathCounters,
     ) -> Option<bool> {
         let medium = self.medium(&path.inside)?;
-        let dimensions = dimension::vertex(path.met);
         let end = hit.map_or(f64::INFINITY, |hit| hit.t);
-        let flight = medium.fly(end, sampler.one_fine(dimensions + dimension::DISTANCE));
-        path.throughput *= flight.weight;
-        let Flight { scattered_at: Some(t), .. } = flight else { return None };
-        path.met += 1;
-        if path.depth == self.max_depth {
-            counters.truncated += 1;
-            return Some(false);
-        }
-        if path.throughput == Rgb::ZERO {
-            return Some(false);
-        }
-        path.cone.advance(t);
-        let p = path.ray.at(t);
-        let here = -path.ray.d;
-        let receiver = Receiver {
-            p,
-            p_error: DVec3::ZERO,
-            ng: here,
-            facing: here,
-            horizon: None,
-            draws_both: false,
+        let (ray, inside) = (path.ray, path.inside);
+        let stretch = Stretch { medium, ray: &ray, end, inside: &inside, met: path.met };
+        let (light, flown) = self.flown(&stretch, path.depth, sampler, counters);
+        path.radiance += self.limited(path.throughput * light, path.depth);
+        let deflection = match flown {
+            Flown::Through(left) => {
+                path.throughput *= left;
+                return None;
+            }
+            Flown::Ended => return Some(false),
+            Flown::Scattered(deflection) => deflection,
         };
+        let Deflection { p, t, wi, pdf, weight, arrival } = deflection;
+        path.throughput *= weight;
+        path.depth += 1;
+        path.cone.advance(t);
+        if !path.cone.is_ray() {
+            path.cone.scatter(pdf, self.samples as f32);
+        }
+        let roulette = dimension::vertex(path.met) + dimension::ROULETTE;
+        path.met += 1;
+        (path.ray.o, path.ray.d, path.arrival) = (p.as_vec3(), wi, arrival);
+        let goes_on = path.depth < self.roulette_depth
+            || path.survives::<SHARE>(sampler.one(roulette), self.roulette_gain);
+        Some(goes_on)
+    }
+
+    /// What becomes of a path of this depth on a stretch, and the light which it gathers there.
+    ///
+    /// At a point of the medium it does what it does at a surface, with the phase function in place of the BSDF.
+    pub(super) fn flown(
+        &self,
+        stretch: &Stretch<I>,
+        depth: u32,
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> (Rgb, Flown) {
+        let Stretch { medium, ray, end, met, .. } = *stretch;
+        let dimensions = dimension::vertex(met);
+        let mut gathered = Rgb::ZERO;
+        if medium.emission != Rgb::ZERO {
+            gathered += medium.emitted(end);
+        }
+        let may_scatter = depth < self.max_depth;
+        let aimed = if may_scatter { self.aimed(stretch, sampler) } else { None };
+        if let Some(aimed) = &aimed {
+            let t =
+                aimed.sample(sampler.one_fine(dimension::flight(met) + dimension::PIVOT_DISTANCE));
+            let ways = Ways { flown: medium.density(t), aimed: aimed.pdf(t), goes_on: true };
+            let seen = (t, dimension::PIVOT_LIGHT);
+            gathered += self.light_from(stretch, seen, (ways, ways.aimed), sampler, counters);
+        }
+        let flown = medium.fly(end, sampler.one_fine(dimensions + dimension::DISTANCE));
+        let Flight { scattered_at: Some(t), weight } = flown else {
+            return (gathered, Flown::Through(flown.weight));
+        };
+        if !may_scatter {
+            counters.truncated += 1;
+        }
+        if !may_scatter || weight == Rgb::ZERO {
+            return (gathered, Flown::Ended);
+        }
+        let p = ray.at(t);
+        let receiver = receiver(p, ray);
+        let aimed = aimed.map_or(0.0, |aimed| aimed.pdf(t));
+        let ways = Ways { flown: medium.density(t), aimed, goes_on: true };
         let (to_scatter, on_light) =
             sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
         let choose = sampler.one_fine(dimensions + dimension::LIGHT);
         let light =
-            self.direct_in_medium(path, medium.phase, &receiver, (choose, on_light), counters);
-        path.radiance += self.limited(path.throughput * light, path.depth);
-        let (wi, pdf) = medium.phase.sample(path.ray.d, to_scatter);
-        path.depth += 1;
-        if !path.cone.is_ray() {
-            path.cone.scatter(pdf, self.samples as f32);
-        }
-        if path.depth >= self.roulette_depth
-            && !path.survives::<SHARE>(
-                sampler.one(dimensions + dimension::ROULETTE),
-                self.roulette_gain,
-            )
-        {
-            return Some(false);
-        }
-        (path.ray.o, path.ray.d) = (p.as_vec3(), wi);
-        path.arrival = Arrival::Drawn { from: receiver, pdf };
-        Some(true)
+            self.scattered(stretch, &receiver, (choose, on_light), (ways, ways.flown), counters);
+        // The density of the distance is in the weight.
+        gathered += weight * light * ways.flown as f32;
+        let (wi, pdf) = medium.phase.sample(ray.d, to_scatter);
+        let arrival = Arrival::Drawn { from: receiver, pdf: pdf / ways.together() };
+        (gathered, Flown::Scattered(Deflection { p, t, wi, pdf, weight, arrival }))
     }
 
-    /// Light which arrives straight from a light and is scattered along the path, by one connection.
-    fn direct_in_medium(
+    /// Light which is scattered once on a stretch, for a path that is not scattered there itself.
+    pub(super) fn scattered_once(
         &self,
-        path: &Path<'a, I>,
-        phase: HenyeyGreenstein,
-        receiver: &Receiver,
-        (choose, on_light): (f64, Vec2),
+        stretch: &Stretch<I>,
+        sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> Rgb {
-        let time = path.ray.time;
+        let Some(aimed) = self.aimed(stretch, sampler) else { return Rgb::ZERO };
+        let before = ScatteredBefore::new(&stretch.medium, stretch.end);
+        let flight = dimension::flight(stretch.met);
+        let ways = |t: f64| Ways {
+            flown: before.map_or(0.0, |before| before.pdf(t)),
+            aimed: if let Aimed::Towards(lamp) = &aimed { lamp.pdf(t) } else { 0.0 },
+            goes_on: false,
+        };
+        let mut light = Rgb::ZERO;
+        if let Some(before) = before {
+            let t = before.sample(sampler.one_fine(flight + dimension::BEFORE_DISTANCE));
+            let (ways, seen) = (ways(t), (t, dimension::BEFORE_LIGHT));
+            light += self.light_from(stretch, seen, (ways, ways.flown), sampler, counters);
+        }
+        if let Aimed::Towards(lamp) = &aimed {
+            let t = lamp.sample(sampler.one_fine(flight + dimension::PIVOT_DISTANCE));
+            let (ways, seen) = (ways(t), (t, dimension::PIVOT_LIGHT));
+            light += self.light_from(stretch, seen, (ways, ways.aimed), sampler, counters);
+        }
+        light
+    }
+
+    /// How a second distance is drawn on a stretch; `None` where no light or nothing which scatters is there.
+    pub(super) fn aimed(&self, stretch: &Stretch<I>, sampler: &Sampler) -> Option<Aimed> {
+        let Stretch { medium, ray, end, met, .. } = *stretch;
+        let dimensions = dimension::flight(met);
+        if medium.sigma_s == Rgb::ZERO {
+            return None;
+        }
+        let before = ScatteredBefore::new(&medium, end);
+        let u = sampler.one_fine(dimensions + dimension::PIVOT_PLACE);
+        let place = before.map_or(0.0, |before| before.sample(u));
+        let choose = sampler.one_fine(dimensions + dimension::PIVOT);
+        match self.scene.lights.pivot(ray.at(place).as_vec3(), ray.time, choose)? {
+            Pivot::Near { centre, radius } => {
+                let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+                Equiangular::new(o, d, end, centre, radius).map(Aimed::Towards)
+            }
+            Pivot::Far => before.map(Aimed::Before),
+        }
+    }
+
+    /// Light of one connection, by the numbers from `dimensions` on, that is scattered towards the beginning of a stretch at a
+    /// distance which was drawn there with the density `own`.
+    pub(super) fn light_from(
+        &self,
+        stretch: &Stretch<I>,
+        (t, dimensions): (f64, u32),
+        (ways, own): (Ways, f64),
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> Rgb {
+        let scattered = stretch.medium.scattered(t);
+        if scattered == Rgb::ZERO {
+            return Rgb::ZERO;
+        }
+        let receiver = receiver(stretch.ray.at(t), stretch.ray);
+        let dimensions = dimension::flight(stretch.met) + dimensions;
+        let drawn = (sampler.one_fine(dimensions + 2), sampler.two(dimensions));
+        scattered * self.scattered(stretch, &receiver, drawn, (ways, own), counters)
+    }
+
+    /// Light which arrives at a point of a stretch straight from a light and is deflected along it, by one connection:
+    /// per metre, over the density of the distance.
+    fn scattered(
+        &self,
+        stretch: &Stretch<I>,
+        receiver: &Receiver,
+        (choose, on_light): (f64, Vec2),
+        (ways, own): (Ways, f64),
+        counters: &mut PathCounters,
+    ) -> Rgb {
+        let time = stretch.ray.time;
         let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
             return Rgb::ZERO;
         };
         // What goes to the light was deflected by as much as what comes from there.
-        let density = phase.density(light.wi.dot(path.ray.d));
+        let density = stretch.medium.phase.density(light.wi.dot(stretch.ray.d));
         let (shadow_ray, end) = light.shadow_ray(receiver, time);
         counters.rays += 1;
-        let left = self.transmitted(&shadow_ray, end, &path.inside);
-        let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, density) };
+        let left = self.transmitted(&shadow_ray, end, stretch.inside);
+        let weight = ways.share(own, (!light.delta).then_some(light.pdf), density);
         light.radiance * left * (density * weight / light.pdf)
     }
 
@@ -110,10 +300,22 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
     }
 
     /// Share of light which is left after a distance in metres in what is around a path.
-    fn left_after(&self, inside: &I, distance: f64) -> Rgb {
+    pub(super) fn left_after(&self, inside: &I, distance: f64) -> Rgb {
         match self.medium(inside) {
             Some(medium) => medium.transmittance(distance),
             None => self.transmittance(inside, distance),
         }
+    }
+}
+
+/// A point of a medium which receives light from all around.
+fn receiver(p: DVec3, ray: &Ray) -> Receiver {
+    Receiver {
+        p,
+        p_error: DVec3::ZERO,
+        ng: -ray.d,
+        facing: Vec3::ZERO,
+        horizon: None,
+        draws_both: false,
     }
 }

@@ -1,6 +1,7 @@
 //! Integrators: the radiance of one pixel sample. One integrator per file.
 
 mod eye;
+mod eye_medium;
 mod film_pass;
 mod medium;
 mod path;

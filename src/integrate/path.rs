@@ -252,6 +252,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 Meeting::Nothing { surface, beyond } => {
                     path.pass(&surface);
                     path.inside = beyond;
+                    // The next flight has numbers of its own.
+                    path.met += u32::from(I::SCATTERS);
                     continue;
                 }
             };
@@ -345,7 +347,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         counters: &mut PathCounters,
     ) -> ControlFlow<(), Option<Hit>> {
         counters.rays += 1;
-        let from_camera = path.met == 0;
+        let from_camera = path.depth == 0;
         let hit = self.scene.geometry.closest_hit(&path.ray, f64::INFINITY, from_camera);
         if I::SCATTERS
             && let Some(goes_on) = self.fly::<SHARE>(path, hit.as_ref(), sampler, counters)

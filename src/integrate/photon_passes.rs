@@ -19,7 +19,7 @@ use super::{PathCounters, PathTracer};
 use crate::build::light::{Aim, PhotonSource};
 use crate::build::photon::{
     IrradianceMap, Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
-    PlaceSettings,
+    PlaceSettings, VolumeMap, VolumeRadius,
 };
 use crate::description::DirectLight;
 use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
@@ -51,6 +51,8 @@ pub struct PhotonScratch {
     global: PhotonMap,
     caustics: PhotonMap,
     irradiance: IrradianceMap,
+    volume: VolumeMap,
+    volume_caustics: VolumeMap,
     faults: NestingFaults,
 }
 
@@ -61,7 +63,7 @@ pub struct PhotonReport {
     pub per_pass: u32,
     /// Photons emitted in all.
     pub emitted: u64,
-    /// Photons left at surfaces in all.
+    /// Photons left at surfaces and in media in all.
     pub stored: u64,
     /// Most photons at once in the map of everything.
     pub global: u64,
@@ -203,7 +205,8 @@ impl<'a> Setting<'a> {
             .geometry
             .instances
             .iter()
-            .filter(|i| i.material != NOTHING && materials.may_cast_caustics(i.material, min_alpha))
+            .filter(|i| i.material != NOTHING && !materials.is_invisible(i.material, None))
+            .filter(|i| materials.may_cast_caustics(i.material, min_alpha))
             .map(|i| i.bounds)
             .collect();
         let aim = Aim::new(&casters);
@@ -216,7 +219,9 @@ impl<'a> Setting<'a> {
 
     /// Whether any photon could be gathered.
     fn wants_photons(&self) -> bool {
-        (self.method != Method::PathWithPhotons || self.casts) && self.storable.contains(&true)
+        let scatters = self.scene.requirements.has(Feature::Scattering);
+        (self.method != Method::PathWithPhotons || self.casts)
+            && (scatters || self.storable.contains(&true))
     }
 
     fn tracer<const O: bool, I: Inside>(&self, keep: Keep) -> PhotonTracer<'_, O, I> {
@@ -307,7 +312,10 @@ impl<'a> Setting<'a> {
         report: &mut PhotonReport,
     ) -> Option<()> {
         let cancel = &self.job.control.cancel;
-        let PhotonScratch { store, global, caustics, irradiance, faults } = scratch;
+        let PhotonScratch { store, global, caustics, irradiance, volume, volume_caustics, faults } =
+            scratch;
+        let scatters = self.scene.requirements.has(Feature::Scattering);
+        let disks = self.volume_radius(pass.pass);
         let mut take = |keep: Keep, build: &mut dyn FnMut(&PhotonStore)| {
             let start = Instant::now();
             let counters: PhotonCounters =
@@ -325,17 +333,29 @@ impl<'a> Setting<'a> {
         if let Some(keep) = self.global_keep() {
             // Without a final gathering the caustics are read from their own map.
             let apart = self.method == Method::PhotonMap && keep == Keep::Indirect;
-            take(keep, &mut |store| match self.places() {
-                Some(places) => irradiance.rebuild(store, pass.emitted, global, &places),
-                None => global.rebuild(store, |photon| !(apart && photon.caustic)),
+            take(keep, &mut |store| {
+                match self.places() {
+                    Some(places) => irradiance.rebuild(store, pass.emitted, global, &places),
+                    None => global.rebuild(store, |photon| !(apart && photon.caustic)),
+                }
+                if scatters {
+                    volume.rebuild(store, &disks);
+                }
             })?;
             report.global = report.global.max(global.len() as u64);
         }
         if self.has_caustic_map() {
-            take(Keep::Caustics, &mut |store| caustics.rebuild(store, |_| true))?;
+            take(Keep::Caustics, &mut |store| {
+                caustics.rebuild(store, |_| true);
+                if scatters {
+                    volume_caustics.rebuild(store, &disks);
+                }
+            })?;
             report.caustics = report.caustics.max(caustics.len() as u64);
         }
-        let memory = store.memory() + global.memory() + caustics.memory() + irradiance.memory();
+        let volumes = volume.memory() + volume_caustics.memory();
+        let memory =
+            store.memory() + global.memory() + caustics.memory() + irradiance.memory() + volumes;
         report.memory_bytes = report.memory_bytes.max(memory as u64);
         Some(())
     }
@@ -417,10 +437,22 @@ impl<'a> Setting<'a> {
                 global: &scratch.global,
                 caustics: &scratch.caustics,
                 irradiance: &scratch.irradiance,
+                volume: &scratch.volume,
+                volume_caustics: &scratch.volume_caustics,
             },
             pixel_size: (side as f32, growth as f32),
             largest_radius: self.largest_radius(),
         }
+    }
+
+    /// How large the disks of photons in media are in a pass.
+    fn volume_radius(&self, pass: u32) -> VolumeRadius {
+        let photons = &self.job.settings.photons;
+        let scale = match self.method {
+            Method::PhotonMap => 1.0,
+            _ => shrunk_by_passes(pass, photons.alpha),
+        };
+        VolumeRadius { enough: photons.enough, scale, largest: self.largest_radius() }
     }
 
     /// Greatest radius over which photons are gathered, metres.

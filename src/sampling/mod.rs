@@ -2,10 +2,12 @@
 //! weights.
 
 mod distribution;
+mod equiangular;
 mod mis;
 mod sobol;
 pub mod warp;
 
 pub use distribution::{Piecewise1D, Piecewise2D};
+pub use equiangular::Equiangular;
 pub use mis::power_heuristic;
 pub use sobol::{Sampler, dimension};

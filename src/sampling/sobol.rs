@@ -48,6 +48,22 @@ pub mod dimension {
     pub const ROULETTE: u32 = 6;
     /// Distance flown in a medium to the vertex (1).
     pub const DISTANCE: u32 = 7;
+    /// First dimension of the flight that ends at vertex `k`, beyond all vertices: where on it light is looked for.
+    pub const fn flight(k: u32) -> u32 {
+        (1 << 30) + 2 * PER_VERTEX * k
+    }
+    /// Place on the flight for which a light is chosen (1), from the first dimension of the flight.
+    pub const PIVOT_PLACE: u32 = 0;
+    /// Which light that is (1).
+    pub const PIVOT: u32 = 1;
+    /// Distance drawn towards it (1).
+    pub const PIVOT_DISTANCE: u32 = 2;
+    /// What is seen from there: point on a light (2), and which one (1).
+    pub const PIVOT_LIGHT: u32 = 3;
+    /// Distance drawn by what is scattered before the end (1).
+    pub const BEFORE_DISTANCE: u32 = 6;
+    /// What is seen from there: point on a light (2), and which one (1).
+    pub const BEFORE_LIGHT: u32 = 7;
 }
 
 /// The random numbers of one sample of one pixel.

@@ -1,6 +1,6 @@
 //! Media which scatter light: how far it flies, and where it goes on.
 
-use crate::description::Rgb;
+use crate::description::{PhaseFunction, Rgb};
 use crate::math::Frame;
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -12,8 +12,10 @@ pub struct Medium {
     pub sigma_s: Rgb,
     /// Extinction coefficient per metre: scattering and absorption.
     pub sigma_t: Rgb,
+    /// What it emits per metre, W·m⁻³·sr⁻¹.
+    pub emission: Rgb,
     /// The phase function.
-    pub phase: HenyeyGreenstein,
+    pub phase: PhaseFunction,
 }
 
 /// How far light has flown.
@@ -35,11 +37,39 @@ impl Medium {
         (-self.sigma_t.as_dvec3() * distance).map(f64::exp).as_vec3()
     }
 
+    /// What is scattered per metre at a distance, of the light that set out: `σ_s` times what is left.
+    #[inline]
+    pub fn scattered(&self, distance: f64) -> Rgb {
+        self.sigma_s * self.transmittance(distance)
+    }
+
+    /// What the first metres emit that comes out at their beginning: the integral of the emission times what is left of
+    /// it, `ε·(1 − exp(−σd))/σ`.
+    pub fn emitted(&self, distance: f64) -> Rgb {
+        let path = self.sigma_t.as_dvec3().map(|sigma| {
+            if sigma > 0.0 { -(-sigma * distance).exp_m1() / sigma } else { distance }
+        });
+        let seen = |emission: f32, path: f64| {
+            if emission > 0.0 { (f64::from(emission) * path) as f32 } else { 0.0 }
+        };
+        let (e, p) = (self.emission, path);
+        Rgb::new(seen(e.x, p.x), seen(e.y, p.y), seen(e.z, p.z))
+    }
+
+    /// The density per metre with which [`Medium::fly`] draws a distance, where no end is in its way.
+    pub fn density(&self, distance: f64) -> f64 {
+        let sigma_t = self.sigma_t.as_dvec3();
+        (sigma_t * (-sigma_t * distance).map(f64::exp)).element_sum() / 3.0
+    }
+
     /// A flight over at most `end` metres, by a number in `[0, 1)`.
     ///
     /// One channel draws the distance, and the balance heuristic over what all of them would have drawn weights it (one
     /// sample of Veach 1997, *Robust Monte Carlo Methods for Light Transport Simulation*, section 9.2.4).
     pub fn fly(&self, end: f64, u: f64) -> Flight {
+        if self.sigma_s == Rgb::ZERO {
+            return Flight { scattered_at: None, weight: self.transmittance(end) };
+        }
         let sigma_t = self.sigma_t.as_dvec3();
         let channel = ((3.0 * u) as usize).min(2);
         let drawn = -(-(3.0 * u - channel as f64)).ln_1p() / sigma_t[channel];
@@ -65,42 +95,84 @@ impl Medium {
     }
 }
 
-/// Henyey and Greenstein's phase function (1941, "Diffuse radiation in the Galaxy", *Astrophys. J.* 93), a density over
-/// directions by the angle of deflection.
+/// Distances at which a medium scatters before an end, by the balance heuristic over its channels: those of
+/// [`Medium::fly`] with the end not reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HenyeyGreenstein {
-    /// Mean cosine of the deflection, in (−1, 1): 0 is isotropic, positive is forwards.
-    pub g: f32,
+pub struct ScatteredBefore {
+    sigma_t: DVec3,
+    end: f64,
+    /// Share of each channel that gets to the end, less 1.
+    lost: DVec3,
 }
 
-impl HenyeyGreenstein {
+impl ScatteredBefore {
+    /// `None` where a channel would come back from infinity.
+    pub fn new(medium: &Medium, end: f64) -> Option<Self> {
+        let sigma_t = medium.sigma_t.as_dvec3();
+        let lost = (-sigma_t * end).map(f64::exp_m1);
+        let fine = end.is_finite() || sigma_t.min_element() > 0.0;
+        (fine && end > 0.0).then_some(Self { sigma_t, end, lost })
+    }
+
+    /// A distance by a number in `[0, 1)`.
+    pub fn sample(&self, u: f64) -> f64 {
+        let channel = ((3.0 * u) as usize).min(2);
+        let u = 3.0 * u - channel as f64;
+        let (sigma, lost) = (self.sigma_t[channel], self.lost[channel]);
+        let t = if lost < 0.0 { -(u * lost).ln_1p() / sigma } else { u * self.end };
+        t.min(self.end)
+    }
+
+    /// The density of a distance, per metre.
+    pub fn pdf(&self, t: f64) -> f64 {
+        let of = |channel: usize| {
+            let (sigma, lost) = (self.sigma_t[channel], self.lost[channel]);
+            if lost < 0.0 { sigma * (-sigma * t).exp() / -lost } else { 1.0 / self.end }
+        };
+        (of(0) + of(1) + of(2)) / 3.0
+    }
+}
+
+impl PhaseFunction {
     /// Per steradian, for light that is deflected by an angle of this cosine.
     #[inline]
-    pub fn density(&self, cos: f32) -> f32 {
-        let g = self.g;
-        // (1 − g)² + 2g(1 − cos): no cancellation where a narrow peak is met.
-        let squared = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos);
-        (1.0 - g) * (1.0 + g) / (2.0 * TAU * squared * squared.sqrt())
+    pub fn density(self, cos: f32) -> f32 {
+        match self {
+            Self::Isotropic => 0.5 / TAU,
+            Self::HenyeyGreenstein(g) => {
+                // (1 − g)² + 2g(1 − cos): no cancellation where a narrow peak is met.
+                let squared = (1.0 - g) * (1.0 - g) + 2.0 * g * (1.0 - cos);
+                (1.0 - g) * (1.0 + g) / (2.0 * TAU * squared * squared.sqrt())
+            }
+            Self::Rayleigh => 0.375 / TAU * (1.0 + cos * cos),
+        }
     }
 
     /// A direction after light that went along the unit vector `d`, with its density.
-    pub fn sample(&self, d: Vec3, u: Vec2) -> (Vec3, f32) {
-        /// Below this the closed form loses more digits than the series of first order lacks.
-        const NEARLY_ISOTROPIC: f32 = 4e-3;
-        let g = self.g;
-        let s = 2.0 * u.x - 1.0;
-        let cos = if g.abs() < NEARLY_ISOTROPIC {
-            s + 1.5 * g * (1.0 - s * s)
-        } else {
-            let ratio = (1.0 - g) * (1.0 + g) / (1.0 + g * s);
-            (1.0 + g * g - ratio * ratio) / (2.0 * g)
-        };
-        let cos = cos.clamp(-1.0, 1.0);
+    pub fn sample(self, d: Vec3, u: Vec2) -> (Vec3, f32) {
+        let cos = self.deflection(u.x).clamp(-1.0, 1.0);
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         let (sin_phi, cos_phi) = (2.0 * PI * u.y).sin_cos();
         let wi = Frame::from_z(d).from_local(Vec3::new(sin * cos_phi, sin * sin_phi, cos));
         let wi = wi.normalize();
         (wi, self.density(wi.dot(d)))
+    }
+
+    /// The cosine of the deflection by a number in `[0, 1)`.
+    fn deflection(self, u: f32) -> f32 {
+        /// Below this the closed form loses more digits than the series of first order lacks.
+        const NEARLY_ISOTROPIC: f32 = 4e-3;
+        let s = 2.0 * u - 1.0;
+        match self {
+            Self::Isotropic => s,
+            Self::HenyeyGreenstein(g) if g.abs() < NEARLY_ISOTROPIC => s + 1.5 * g * (1.0 - s * s),
+            Self::HenyeyGreenstein(g) => {
+                let ratio = (1.0 - g) * (1.0 + g) / (1.0 + g * s);
+                (1.0 + g * g - ratio * ratio) / (2.0 * g)
+            }
+            // The root of c³ + 3c = 4s.
+            Self::Rayleigh => 2.0 * ((2.0 * s).asinh() / 3.0).sinh(),
+        }
     }
 }
 
@@ -110,7 +182,12 @@ mod tests {
     use crate::sampling::Sampler;
 
     fn medium(sigma_s: Rgb, sigma_a: Rgb) -> Medium {
-        Medium { sigma_s, sigma_t: sigma_s + sigma_a, phase: HenyeyGreenstein { g: 0.0 } }
+        Medium {
+            sigma_s,
+            sigma_t: sigma_s + sigma_a,
+            emission: Rgb::ZERO,
+            phase: PhaseFunction::Isotropic,
+        }
     }
 
     /// Closed forms: densities forwards, backwards and at an angle; the cosine drawn by a half; the mean of the cosine and
@@ -120,14 +197,14 @@ mod tests {
         for (g, cos, expected) in
             [(0.8, 1.0, 3.580_986_2), (0.8, -1.0, 0.004_912_2), (-0.3, 0.2, 0.054_406_8)]
         {
-            let density = HenyeyGreenstein { g }.density(cos);
+            let density = PhaseFunction::HenyeyGreenstein(g).density(cos);
             assert!((density / expected - 1.0_f32).abs() < 1e-4, "{g} {cos}: {density}");
         }
-        let (wi, _) = HenyeyGreenstein { g: 0.5 }.sample(Vec3::Z, Vec2::splat(0.5));
+        let (wi, _) = PhaseFunction::HenyeyGreenstein(0.5).sample(Vec3::Z, Vec2::splat(0.5));
         assert!((wi.z - 0.6875).abs() < 1e-6, "{wi}");
         let n = 1 << 14;
         for g in [-0.999, -0.5, -1e-3, 0.0, 3.9e-3, 4.1e-3, 0.3, 0.8, 0.999] {
-            let phase = HenyeyGreenstein { g };
+            let phase = PhaseFunction::HenyeyGreenstein(g);
             let d = Vec3::new(0.3, -0.5, 0.7).normalize();
             let (mut first, mut second, mut solid_angle) = (0.0, 0.0, 0.0);
             for index in 0..n {
@@ -146,6 +223,59 @@ mod tests {
             // Evenly drawn cosines hardly meet a narrow peak.
             assert!(g.abs() > 0.9 || (solid_angle - 1.0).abs() < 0.02, "{g}: {solid_angle}");
         }
+    }
+
+    /// Closed forms of Rayleigh's function: its values, `⟨cos⟩ = 0`, `⟨cos²⟩ = 2/5`, and the number that each cosine has.
+    #[test]
+    fn deflections_follow_rayleigh() {
+        let phase = PhaseFunction::Rayleigh;
+        assert!((phase.density(1.0) - 0.119_366_2).abs() < 1e-7);
+        assert!((phase.density(0.0) - 0.059_683_1).abs() < 1e-7);
+        let (n, mut first, mut second) = (1 << 12, 0.0, 0.0);
+        for k in 0..n {
+            let u = (f64::from(k) + 0.5) / f64::from(n);
+            let cos = f64::from(phase.deflection(u as f32));
+            let below = 0.5 + (3.0 * cos + cos.powi(3)) / 8.0;
+            assert!((below - u).abs() < 1e-6, "{u}: {below}");
+            first += cos / f64::from(n);
+            second += cos * cos / f64::from(n);
+        }
+        assert!(first.abs() < 1e-6 && (second - 0.4).abs() < 1e-6, "{first} {second}");
+    }
+
+    /// Closed forms of what glows: with absorption, without, and endless; a colour that does not glow is dark there.
+    #[test]
+    fn what_glows_is_seen_through_itself() {
+        let glow = |absorbed: f32| Medium {
+            emission: Rgb::new(2.0, 1.0, 0.0),
+            ..medium(Rgb::ZERO, Rgb::new(absorbed, absorbed, 0.0))
+        };
+        let seen = glow(0.5).emitted(3.0);
+        assert!((seen - Rgb::new(3.107_479_4, 1.553_739_7, 0.0)).abs().max_element() < 1e-6);
+        assert_eq!(glow(0.0).emitted(3.0), Rgb::new(6.0, 3.0, 0.0));
+        assert!((glow(1e-9).emitted(3.0) - Rgb::new(6.0, 3.0, 0.0)).abs().max_element() < 1e-6);
+        assert_eq!(glow(0.5).emitted(f64::INFINITY), Rgb::new(4.0, 2.0, 0.0));
+    }
+
+    /// Distances before an end: the densities integrate to 1 and are those of what is drawn, thin and thick.
+    #[test]
+    fn distances_before_an_end() {
+        for (sigma, end) in [(0.0, 2.0), (1e-9, 2.0), (0.7, 2.0), (1e9, 2.0), (0.7, f64::INFINITY)]
+        {
+            let fog = medium(Rgb::splat(sigma), Rgb::ZERO);
+            let Some(before) = ScatteredBefore::new(&fog, end) else { panic!("{sigma} {end}") };
+            for k in 0..64 {
+                // All of a channel, at its middle numbers.
+                let (u, h) = ((1.0 + (f64::from(k) + 0.5) / 64.0) / 3.0, 1e-6);
+                let [a, t, b] = [u - h, u, u + h].map(|u| before.sample(u));
+                assert!(0.0 < t && t < end);
+                let expected = 2.0 * h * 3.0 / (b - a);
+                let error = (before.pdf(t) / expected - 1.0).abs();
+                assert!(error < 1e-3, "{sigma} {end} {u}: {error}");
+            }
+        }
+        let clear = medium(Rgb::new(0.0, 1.0, 1.0), Rgb::ZERO);
+        assert_eq!(ScatteredBefore::new(&clear, f64::INFINITY), None);
     }
 
     /// Closed forms, channel by channel: the share that comes to the end is `exp(−σd)`, what scatters is the albedo times

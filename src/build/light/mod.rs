@@ -6,6 +6,7 @@ mod bounds;
 mod choice;
 mod emission;
 mod node;
+mod pivot;
 mod shapes;
 mod sky;
 mod split;
@@ -15,6 +16,7 @@ mod tree;
 
 pub use aim::{Aim, BoundingSphere};
 pub use emission::{EmittedPhoton, PhotonNumbers, PhotonSource, rebuild_photon_source};
+pub use pivot::Pivot;
 pub use shapes::{ShapeLights, prepare_shape_lights};
 pub use sky::SkyLight;
 pub use table::{Emitted, Emitter, LightTable, rebuild_light_table};

@@ -96,7 +96,7 @@ impl SkyLight {
     }
 
     /// Draws a direction towards the sky and its density per unit solid angle. `normal` is where the
-    /// receiving surface faces: a constant sky is drawn by the cosine around it.
+    /// receiving surface faces: a constant sky is drawn by the cosine around it, and evenly where that is zero.
     pub fn sample(
         &self,
         normal: Vec3,
@@ -104,6 +104,7 @@ impl SkyLight {
         render_from_light: &DAffine3,
     ) -> Option<(Vec3, f32)> {
         match &self.map {
+            None if normal == Vec3::ZERO => Some((uniform_sphere(u), 0.5 / TAU)),
             None => {
                 let local = cosine_hemisphere(u);
                 Some((Frame::from_z(normal).from_local(local), cosine_hemisphere_pdf(local.z)))
@@ -120,15 +121,13 @@ impl SkyLight {
     /// Draws a direction towards the sky for no receiver in particular, and its density per unit
     /// solid angle: evenly over the sphere for a constant sky, by the map otherwise.
     pub fn sample_all_around(&self, u: Vec2, render_from_light: &DAffine3) -> Option<(Vec3, f32)> {
-        match &self.map {
-            None => Some((uniform_sphere(u), 1.0 / (2.0 * TAU))),
-            Some(_) => self.sample(Vec3::Z, u, render_from_light),
-        }
+        self.sample(Vec3::ZERO, u, render_from_light)
     }
 
     /// The density with which [`SkyLight::sample`] draws `wi`, per unit solid angle.
     pub fn pdf(&self, normal: Vec3, wi: Vec3, render_from_light: &DAffine3) -> f32 {
         match &self.map {
+            None if normal == Vec3::ZERO => 0.5 / TAU,
             None => cosine_hemisphere_pdf(wi.dot(normal)),
             Some(map) => {
                 let uv = direction_to_uv(to_light(render_from_light, wi));

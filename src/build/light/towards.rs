@@ -28,7 +28,7 @@ pub struct Receiver {
     pub p_error: DVec3,
     /// Unit geometric normal.
     pub ng: Vec3,
-    /// Unit shading normal on the side from which the path arrives.
+    /// Unit shading normal on the side from which the path arrives; zero in a medium, which faces nowhere.
     pub facing: Vec3,
     /// The same normal if light from behind it cannot matter; `None` where the surface transmits.
     pub horizon: Option<Vec3>,

@@ -92,9 +92,10 @@ impl IrradianceMap {
         };
         let (places, light) = store.chunks.split_at(first);
         let share = 1.0 - f64::from(CHUNK) * first as f64 / f64::from(emitted.max(1));
+        let light = light.iter().flat_map(|chunk| &chunk.surfaces);
         photons.rebuild_weighted(light, (1.0 / share) as f32, |_| true);
         self.places.clear();
-        self.places.extend(places.iter().flatten());
+        self.places.extend(places.iter().flat_map(|chunk| &chunk.surfaces));
         self.places
             .par_iter()
             .map_init(Vec::new, |distances, place| computed(place, photons, settings, distances))
@@ -166,6 +167,7 @@ fn computed(
 
 #[cfg(test)]
 mod tests {
+    use super::super::trace::Chunk;
     use super::*;
     use crate::sampling::Sampler;
 
@@ -185,7 +187,7 @@ mod tests {
                 Photon::new(position, power, wi, Vec3::Z, u32::from(wi.z < 0.0) * 7, false)
             })
             .collect();
-        PhotonStore { chunks: photons.chunks(CHUNK as usize).map(<[Photon]>::to_vec).collect() }
+        PhotonStore { chunks: photons.chunks(CHUNK as usize).map(Chunk::of_surfaces).collect() }
     }
 
     fn query(k: u32, normal: Vec3) -> QueryPoint {
@@ -218,7 +220,7 @@ mod tests {
             |photon: &&Photon| photon.wi().z > 0.0 && photon.position.abs().max_element() < 0.8;
         let lit: Vec<f64> = store.chunks[16..]
             .iter()
-            .flatten()
+            .flat_map(|chunk| &chunk.surfaces)
             .filter(inner)
             .step_by(4)
             .map(|place| computed(place, &photons, &SETTINGS, &mut Vec::new()))

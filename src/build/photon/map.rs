@@ -63,18 +63,18 @@ impl QueryPoint {
 impl PhotonMap {
     /// Builds the map anew over those photons of `store` which `keep` chooses.
     pub fn rebuild(&mut self, store: &PhotonStore, keep: impl Fn(&Photon) -> bool) {
-        self.rebuild_weighted(&store.chunks, 1.0, keep);
+        self.rebuild_weighted(store.iter(), 1.0, keep);
     }
 
     /// Builds the map anew over those photons which `keep` chooses, their power multiplied by `weight`.
-    pub(super) fn rebuild_weighted(
+    pub(super) fn rebuild_weighted<'p>(
         &mut self,
-        chunks: &[Vec<Photon>],
+        photons: impl Iterator<Item = &'p Photon>,
         weight: f32,
         keep: impl Fn(&Photon) -> bool,
     ) {
         self.unsorted.clear();
-        for photon in chunks.iter().flatten().filter(|photon| keep(photon)) {
+        for photon in photons.filter(|photon| keep(photon)) {
             let mut photon = *photon;
             photon.power *= weight;
             self.unsorted.push(photon);
@@ -136,12 +136,11 @@ mod tests {
     use crate::sampling::Sampler;
 
     fn store(positions: impl Iterator<Item = Vec3>) -> PhotonStore {
-        let photons: Vec<Photon> = positions
-            .enumerate()
-            .map(|(k, p)| Photon::new(p, Rgb::splat(k as f32), Vec3::Z, Vec3::Z, 1, k % 3 == 0))
-            .collect();
-        // in lists of uneven length, as the workers leave them
-        PhotonStore { chunks: photons.chunks(700).map(<[Photon]>::to_vec).collect() }
+        let mut store = PhotonStore::default();
+        for (k, p) in positions.enumerate() {
+            store.push(Photon::new(p, Rgb::splat(k as f32), Vec3::Z, Vec3::Z, 1, k % 3 == 0));
+        }
+        store
     }
 
     fn cloud(n: u32) -> impl Iterator<Item = Vec3> {

@@ -22,6 +22,7 @@
 //! drawn.
 
 use super::Photon;
+use super::fly::Flown;
 use crate::build::bvh::SurfacePoint;
 use crate::build::light::{Aim, EmittedPhoton, Lights, PhotonNumbers, PhotonSource};
 use crate::build::nesting::{Meeting, NestedGeometry};
@@ -73,7 +74,7 @@ pub struct PhotonPass {
 pub struct PhotonCounters {
     /// Photons emitted, those without power included.
     pub emitted: u64,
-    /// Photons left at surfaces.
+    /// Photons left at surfaces and in media.
     pub stored: u64,
     /// Rays traced.
     pub rays: u64,
@@ -97,40 +98,72 @@ impl PhotonCounters {
     }
 }
 
+/// Photons of one worker's share.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Chunk {
+    /// At surfaces.
+    pub(super) surfaces: Vec<Photon>,
+    /// In media; they have no normal.
+    media: Vec<Photon>,
+}
+
+#[cfg(test)]
+impl Chunk {
+    /// Photons at surfaces alone.
+    pub(super) fn of_surfaces(photons: &[Photon]) -> Self {
+        Self { surfaces: photons.to_vec(), media: Vec::new() }
+    }
+}
+
 /// The photons of a pass in the order in which they were emitted, a list for each worker's share. The
 /// memory is kept from pass to pass.
 #[derive(Clone, Debug, Default)]
 pub struct PhotonStore {
-    pub(super) chunks: Vec<Vec<Photon>>,
+    pub(super) chunks: Vec<Chunk>,
 }
 
 impl PhotonStore {
-    /// The photons in order.
+    /// The photons at surfaces in order.
     pub fn iter(&self) -> impl Iterator<Item = &Photon> {
-        self.chunks.iter().flatten()
+        self.chunks.iter().flat_map(|chunk| &chunk.surfaces)
     }
 
-    /// Adds a photon at the end.
+    /// The photons in media in order.
+    pub fn in_media(&self) -> impl Iterator<Item = &Photon> {
+        self.chunks.iter().flat_map(|chunk| &chunk.media)
+    }
+
+    /// Adds a photon at a surface at the end.
     pub fn push(&mut self, photon: Photon) {
-        match self.chunks.last_mut() {
-            Some(chunk) => chunk.push(photon),
-            None => self.chunks.push(vec![photon]),
+        self.last().surfaces.push(photon);
+    }
+
+    /// Adds a photon in a medium at the end.
+    pub fn push_in_medium(&mut self, photon: Photon) {
+        self.last().media.push(photon);
+    }
+
+    fn last(&mut self) -> &mut Chunk {
+        if self.chunks.is_empty() {
+            self.chunks.push(Chunk::default());
         }
+        self.chunks.last_mut().expect("there is one")
     }
 
-    /// How many.
+    /// How many are at surfaces.
     pub fn len(&self) -> usize {
-        self.chunks.iter().map(Vec::len).sum()
+        self.chunks.iter().map(|chunk| chunk.surfaces.len()).sum()
     }
 
-    /// Whether there are none.
+    /// Whether there are none at surfaces.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
     /// Bytes held.
     pub fn memory(&self) -> usize {
-        self.chunks.iter().map(|chunk| chunk.capacity() * size_of::<Photon>()).sum()
+        let capacity = |chunk: &Chunk| chunk.surfaces.capacity() + chunk.media.capacity();
+        self.chunks.iter().map(capacity).sum::<usize>() * size_of::<Photon>()
     }
 }
 
@@ -166,9 +199,10 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
         store: &mut PhotonStore,
         cancel: &AtomicBool,
     ) -> Option<PhotonCounters> {
-        store.chunks.resize_with(pass.emitted.div_ceil(CHUNK) as usize, Vec::new);
-        let trace_chunk = |(chunk, photons): (u32, &mut Vec<Photon>)| {
-            photons.clear();
+        store.chunks.resize_with(pass.emitted.div_ceil(CHUNK) as usize, Chunk::default);
+        let trace_chunk = |(chunk, photons): (u32, &mut Chunk)| {
+            photons.surfaces.clear();
+            photons.media.clear();
             if cancel.load(Relaxed) {
                 return None;
             }
@@ -177,7 +211,7 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             for index in first..first.saturating_add(CHUNK).min(pass.emitted) {
                 self.trace(pass, index, photons, &mut counters);
             }
-            counters.stored = photons.len() as u64;
+            counters.stored = (photons.surfaces.len() + photons.media.len()) as u64;
             Some(counters)
         };
         let chunks = store.chunks.par_iter_mut().enumerate().map(|(k, c)| (k as u32, c));
@@ -189,7 +223,7 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
         &self,
         pass: &PhotonPass,
         index: u32,
-        photons: &mut Vec<Photon>,
+        photons: &mut Chunk,
         counters: &mut PhotonCounters,
     ) {
         counters.emitted += 1;
@@ -209,41 +243,58 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
         self.follow(EmittedPhoton { power, ..photon }, &sampler, photons, counters);
     }
 
+    /// Whether a photon is left after so many interactions.
+    pub(super) fn keeps(&self, depth: u32, caustic: bool) -> bool {
+        match self.keep {
+            Keep::All => true,
+            Keep::Indirect => depth > 0,
+            Keep::Caustics => caustic,
+        }
+    }
+
     fn follow(
         &self,
         photon: EmittedPhoton,
         sampler: &Sampler,
-        photons: &mut Vec<Photon>,
+        photons: &mut Chunk,
         counters: &mut PhotonCounters,
     ) {
-        let EmittedPhoton { mut ray, mut power } = photon;
+        let EmittedPhoton { ray, power } = photon;
         let PhotonTracer { scene: NestedGeometry { geometry, materials, .. }, .. } = *self;
-        let mut inside = I::new(&if I::NESTS {
+        let inside = I::new(&if I::NESTS {
             self.scene.around(ray.o, ray.time)
         } else {
             SolidStack::default()
         });
-        // Surface interactions, and surfaces met: those which let the photon pass count only here.
-        let mut depth = 0;
-        let mut met = 0;
-        let mut only_specular = true;
+        let mut walk = Walk { ray, power, inside, depth: 0, met: 0, only_specular: true };
         loop {
             counters.rays += 1;
-            let Some(hit) = geometry.closest_hit(&ray, f64::INFINITY, false) else {
-                self.scene.escape(&inside, &mut counters.nesting);
+            let hit = geometry.closest_hit(&walk.ray, f64::INFINITY, false);
+            if I::SCATTERS {
+                match self.fly(&mut walk, hit.as_ref(), sampler, &mut photons.media, counters) {
+                    Flown::Through => {}
+                    Flown::Scattered => continue,
+                    Flown::Ended => return,
+                }
+            }
+            let Some(hit) = hit else {
+                self.scene.escape(&walk.inside, &mut counters.nesting);
                 return;
             };
-            if I::ABSORBS {
-                power *= materials.transmittance(inside.medium(), hit.t);
+            if I::ABSORBS && !I::SCATTERS {
+                walk.power *= materials.transmittance(walk.inside.medium(), hit.t);
             }
-            let meeting = self.scene.meet(&ray, hit, &mut inside, &mut counters.nesting);
+            let meeting = self.scene.meet(&walk.ray, hit, &mut walk.inside, &mut counters.nesting);
             let (hit, mut surface, mut beyond, outside) = match meeting {
                 Meeting::Surface { hit, surface, beyond, outside } => {
                     (hit, surface, beyond, outside)
                 }
                 Meeting::Nothing { surface, beyond } => {
-                    ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
-                    inside = beyond;
+                    walk.ray.o =
+                        offset_ray_origin(surface.p, surface.p_error, surface.ng, walk.ray.d);
+                    walk.inside = beyond;
+                    // The next flight has numbers of its own.
+                    walk.met += u32::from(I::SCATTERS);
                     continue;
                 }
             };
@@ -251,71 +302,79 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             if material == NOTHING {
                 return;
             }
-            let dimensions = dimension::vertex(met);
-            met += 1;
-            let caustic = only_specular && depth > 0;
-            let kept = match self.keep {
-                Keep::All => true,
-                Keep::Indirect => depth > 0,
-                Keep::Caustics => caustic,
-            };
-            if kept && self.storable[material as usize] {
-                leave(&surface, &ray, power, depth, caustic, photons);
+            let dimensions = dimension::vertex(walk.met);
+            walk.met += 1;
+            let caustic = walk.only_specular && walk.depth > 0;
+            if self.keeps(walk.depth, caustic) && self.storable[material as usize] {
+                leave(&surface, &walk.ray, walk.power, walk.depth, caustic, &mut photons.surfaces);
             }
-            let at = geometry.texture_point(hit.instance, &surface, ray.time);
+            let at = geometry.texture_point(hit.instance, &surface, walk.ray.time);
             let mut roulette = None;
             if OPACITY {
                 let u = || sampler.one(dimensions + dimension::ROULETTE);
                 let Some(left) = materials.stopped(material, &at, u) else {
-                    ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, ray.d);
+                    walk.ray.o =
+                        offset_ray_origin(surface.p, surface.p_error, surface.ng, walk.ray.d);
                     continue;
                 };
                 roulette = left;
             }
             // What is left at a surface has met at most `max_depth` surfaces with that one.
-            if depth + 1 >= self.max_depth {
+            if walk.depth + 1 >= self.max_depth {
                 counters.truncated += 1;
                 return;
             }
             let mut lobe = sampler.one(dimensions + dimension::LOBE);
             let chosen = materials.choose(material, &at, &mut lobe);
-            let (media, sides) = ((material, outside), [&mut inside, &mut beyond]);
-            power *= self.scene.disperse(media, sides, sampler, dimension::PHOTON_WAVELENGTH);
-            let nm = inside.wavelength();
+            let (media, sides) = ((material, outside), [&mut walk.inside, &mut beyond]);
+            walk.power *= self.scene.disperse(media, sides, sampler, dimension::PHOTON_WAVELENGTH);
+            let nm = walk.inside.wavelength();
             let bsdf = materials.chosen_bsdf_tuned(chosen.material, &at, outside, nm);
             if let Some(relief) = chosen.relief {
                 // What a photon stands for is not known.
                 let (turn, cone) = ((materials, relief), Cone::default());
-                geometry.turn_normal(turn, cone, &ray, &hit, &mut surface, &at);
+                geometry.turn_normal(turn, cone, &walk.ray, &hit, &mut surface, &at);
             }
             let storable = bsdf.is_storable(self.min_alpha);
             if self.keep == Keep::Caustics && matches!(bsdf, Bsdf::Diffuse(_)) {
                 return;
             }
             let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
-            let scattering = Scattering::new(surface, -ray.d, bsdf);
+            let scattering = Scattering::new(surface, -walk.ray.d, bsdf);
             let Some((wi, sample, weight)) = scattering.draw(lobe, direction) else { return };
-            only_specular &= sample.delta || !storable;
-            if self.keep == Keep::Caustics && !only_specular {
+            walk.only_specular &= sample.delta || !storable;
+            if self.keep == Keep::Caustics && !walk.only_specular {
                 return;
             }
-            let before = power.max_element();
-            power *= weight;
-            let survival = (power.max_element() / before).min(1.0);
+            let before = walk.power.max_element();
+            walk.power *= weight;
+            let survival = (walk.power.max_element() / before).min(1.0);
             let u = roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE));
             if u >= survival || survival.is_nan() {
                 return;
             }
-            power /= survival;
-            depth += 1;
+            walk.power /= survival;
+            walk.depth += 1;
             if scattering.crosses(wi) {
-                inside = beyond;
+                walk.inside = beyond;
             }
             let surface = &scattering.surface;
-            ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
-            ray.d = wi;
+            walk.ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
+            walk.ray.d = wi;
         }
     }
+}
+
+/// A photon on its way.
+pub(super) struct Walk<I> {
+    pub(super) ray: Ray,
+    pub(super) power: Rgb,
+    pub(super) inside: I,
+    /// Interactions with surfaces and media.
+    pub(super) depth: u32,
+    /// The same with surfaces which let the photon pass.
+    pub(super) met: u32,
+    pub(super) only_specular: bool,
 }
 
 /// Leaves a photon at a surface.

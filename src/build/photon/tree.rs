@@ -48,7 +48,7 @@ struct Key {
 #[derive(Clone, Debug)]
 pub(super) struct PointTree<T> {
     pub(super) planes: Vec<Plane>,
-    levels: u32,
+    pub(super) levels: u32,
     /// In the order of the leaves.
     points: Vec<T>,
     keys: Vec<Key>,

@@ -9,8 +9,8 @@ use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
 use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
 use crate::description::{
-    Curve, Dispersion, Displacement, Material, Relief, Rgb, Shape, Texture, TriangleMesh, Value,
-    Wave,
+    Curve, Dispersion, Displacement, Material, PhaseFunction, Relief, Rgb, Shape, Texture,
+    TriangleMesh, Value, Wave,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
@@ -241,6 +241,7 @@ pub(super) fn read_material(
             roughness,
             attenuation,
             scattering,
+            emission,
             priority: _,
         } => {
             let fine = limits::number(check.report, &cursor.at("ior"), *ior, &limits::IOR);
@@ -258,8 +259,11 @@ pub(super) fn read_material(
                 let cursor = &cursor.at("scattering");
                 let mut check = Parameters { cursor, names, report: check.report };
                 check.rgb("coefficient", scattering.coefficient, &limits::COEFFICIENT);
-                check.number("g", scattering.g, &limits::MEAN_COSINE);
+                if let PhaseFunction::HenyeyGreenstein(g) = scattering.phase {
+                    check.number("phase", g, &limits::MEAN_COSINE);
+                }
             }
+            check.rgb("emission", *emission, &limits::STRENGTH);
         }
         Material::ThinGlass { ior, tint } => {
             check.number("ior", *ior, &limits::IOR);

@@ -285,8 +285,9 @@ fn solid(index: u32, materials: &[Material<u32>]) -> Option<u32> {
 
 fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
     let solid = solid(index, materials)?;
-    let Material::Dielectric { ior, dispersion, attenuation, scattering, priority, .. } =
-        &materials[solid as usize]
+    let Material::Dielectric {
+        ior, dispersion, attenuation, scattering, emission, priority, ..
+    } = &materials[solid as usize]
     else {
         unreachable!("a solid is a dielectric")
     };
@@ -294,6 +295,7 @@ fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
         ior: index_at_d(*ior, dispersion.as_ref()),
         sigma_a: attenuation.map(|attenuation| attenuation.sigma_a()),
         scattering: *scattering,
+        emission: *emission,
         priority: *priority,
     })
 }

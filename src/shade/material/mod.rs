@@ -15,7 +15,7 @@ use super::bsdf::{
     ReflectorLobe, ReflectorTable, RoughConductor, RoughDielectric, RoughPlastic, SmoothConductor,
     SmoothDielectric, SmoothPlastic, ThinGlass, reflector_table,
 };
-use super::medium::{HenyeyGreenstein, Medium};
+use super::medium::Medium;
 use super::relative::RelativeTables;
 use super::texture::{TexturePoint, Textures};
 use crate::description::{IndexCurve, Material, Rgb, Scattering, Value};
@@ -50,6 +50,8 @@ pub struct Interior {
     pub sigma_a: Option<Rgb>,
     /// What is scattered; `None` where light goes straight on.
     pub scattering: Option<Scattering>,
+    /// What the inside emits per metre, W·m⁻³·sr⁻¹.
+    pub emission: Rgb,
     /// Where solids overlap, the one of the highest priority is there.
     pub priority: i32,
 }
@@ -263,17 +265,20 @@ impl MaterialTable {
         }
     }
 
-    /// The medium inside a solid of this material which scatters; `None` for air ([`NOTHING`]) and all others.
+    /// The medium inside a solid of this material which scatters or glows; `None` for air ([`NOTHING`]) and all others.
     #[inline]
     pub fn medium(&self, material: u32) -> Option<Medium> {
         if material == NOTHING {
             return None;
         }
         let interior = self.interior(material)?;
-        let Scattering { coefficient, g } =
-            interior.scattering.filter(|scattering| scattering.coefficient != Rgb::ZERO)?;
-        let sigma_t = coefficient + interior.sigma_a.unwrap_or(Rgb::ZERO);
-        Some(Medium { sigma_s: coefficient, sigma_t, phase: HenyeyGreenstein { g } })
+        let Interior { sigma_a, scattering, emission, .. } = interior;
+        let Scattering { coefficient: sigma_s, phase } = scattering.unwrap_or_default();
+        if sigma_s == Rgb::ZERO && emission == Rgb::ZERO {
+            return None;
+        }
+        let sigma_t = sigma_s + sigma_a.unwrap_or(Rgb::ZERO);
+        Some(Medium { sigma_s, sigma_t, emission, phase })
     }
 
     /// Whether a smooth surface with equal indices on both sides, at all wavelengths, is no surface: only what is inside

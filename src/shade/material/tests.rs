@@ -22,6 +22,7 @@ fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Materi
         roughness,
         attenuation,
         scattering: None,
+        emission: Rgb::ZERO,
         priority: 0,
     }
 }
@@ -116,7 +117,13 @@ fn solids_know_their_interior() {
     }
     assert_eq!(
         table.interior(2),
-        Some(Interior { ior: 1.5, sigma_a: None, scattering: None, priority: 0 })
+        Some(Interior {
+            ior: 1.5,
+            sigma_a: None,
+            scattering: None,
+            emission: Rgb::ZERO,
+            priority: 0
+        })
     );
     assert_eq!(table.attenuation(2), None);
     assert!(table.is_dielectric(2) && !table.is_dielectric(3));
@@ -213,6 +220,7 @@ fn a_prism_turns_each_line_by_its_angle() {
         roughness: 0.0.into(),
         attenuation: None,
         scattering: None,
+        emission: Rgb::ZERO,
         priority: 0,
     };
     let table = MaterialTable::new(&[material(glass), material(air)], Textures::default());

@@ -226,8 +226,10 @@ fn solids_say_what_is_wrong() {
         ("dispersion: Sellmeier(b: [1], c: [0.3])", "outside of 1 to 10"),
         ("ior: 1.5, dispersion: Bk7", "says the index of refraction itself"),
         ("scattering: (coefficient: (-1, 0, 0))", "at least 0"),
-        ("scattering: (coefficient: (1, 1, 1), g: 1)", "less than 1"),
-        ("scattering: (g: 0)", "coefficient"),
+        ("scattering: (coefficient: (1, 1, 1), phase: HenyeyGreenstein(1))", "less than 1"),
+        ("scattering: (phase: Rayleigh)", "coefficient"),
+        ("scattering: (coefficient: (1, 1, 1), phase: Rayleig)", "Rayleigh"),
+        ("emission: (-1, 0, 0)", "at least 0"),
     ] {
         let part = format!(r#"materials: {{"m": Dielectric({fields})}}"#);
         let told = mistakes(&with_part(&part));
