@@ -16,6 +16,9 @@ use crate::shade::medium::{Flight, Medium, ScatteredBefore};
 use crate::shade::nesting::Inside;
 use glam::{DVec3, Vec2, Vec3};
 
+/// Distances at which a path that is not scattered looks for light: gathering photons costs about as much as so many.
+const LOOKS: u32 = 4;
+
 /// A way through a medium.
 #[derive(Clone, Copy)]
 pub(super) struct Stretch<'s, I> {
@@ -197,7 +200,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         (gathered, Flown::Scattered(Deflection { p, t, wi, pdf, weight, arrival }))
     }
 
-    /// Light which is scattered once on a stretch, for a path that is not scattered there itself.
+    /// Light which is scattered once on a stretch, for a path that is not scattered there itself: from a few distances, one in
+    /// each part of what is scattered before the end.
     pub(super) fn scattered_once(
         &self,
         stretch: &Stretch<I>,
@@ -208,15 +212,18 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let before = ScatteredBefore::new(&stretch.medium, stretch.end);
         let flight = dimension::flight(stretch.met);
         let ways = |t: f64| Ways {
-            flown: before.map_or(0.0, |before| before.pdf(t)),
+            flown: before.map_or(0.0, |before| f64::from(LOOKS) * before.pdf(t)),
             aimed: if let Aimed::Towards(lamp) = &aimed { lamp.pdf(t) } else { 0.0 },
             goes_on: false,
         };
         let mut light = Rgb::ZERO;
         if let Some(before) = before {
-            let t = before.sample(sampler.one_fine(flight + dimension::BEFORE_DISTANCE));
-            let (ways, seen) = (ways(t), (t, dimension::BEFORE_LIGHT));
-            light += self.light_from(stretch, seen, (ways, ways.flown), sampler, counters);
+            let u = sampler.one_fine(flight + dimension::BEFORE_DISTANCE);
+            for look in 0..LOOKS {
+                let t = before.sample((f64::from(look) + u) / f64::from(LOOKS));
+                let (ways, seen) = (ways(t), (t, dimension::BEFORE_LIGHT + 3 * look));
+                light += self.light_from(stretch, seen, (ways, ways.flown), sampler, counters);
+            }
         }
         if let Aimed::Towards(lamp) = &aimed {
             let t = lamp.sample(sampler.one_fine(flight + dimension::PIVOT_DISTANCE));

@@ -48,9 +48,11 @@ pub mod dimension {
     pub const ROULETTE: u32 = 6;
     /// Distance flown in a medium to the vertex (1).
     pub const DISTANCE: u32 = 7;
+    /// Dimensions of one flight.
+    const PER_FLIGHT: u32 = 32;
     /// First dimension of the flight that ends at vertex `k`, beyond all vertices: where on it light is looked for.
     pub const fn flight(k: u32) -> u32 {
-        (1 << 30) + 2 * PER_VERTEX * k
+        (1 << 30) + PER_FLIGHT * k
     }
     /// Place on the flight for which a light is chosen (1), from the first dimension of the flight.
     pub const PIVOT_PLACE: u32 = 0;
@@ -60,9 +62,9 @@ pub mod dimension {
     pub const PIVOT_DISTANCE: u32 = 2;
     /// What is seen from there: point on a light (2), and which one (1).
     pub const PIVOT_LIGHT: u32 = 3;
-    /// Distance drawn by what is scattered before the end (1).
+    /// Distances drawn by what is scattered before the end (1).
     pub const BEFORE_DISTANCE: u32 = 6;
-    /// What is seen from there: point on a light (2), and which one (1).
+    /// What is seen from the first of them: point on a light (2), and which one (1); those of the others follow.
     pub const BEFORE_LIGHT: u32 = 7;
 }
 
