@@ -5,7 +5,7 @@ use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
 use crate::extract::{
-    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Method, Requirements,
+    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Requirements,
     Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError};
@@ -294,7 +294,7 @@ impl Simulation {
         }
         let method = self.world.resource::<ChosenIntegrator>().method;
         let glows = self.world.resource::<Requirements>().has(Feature::GlowingSolids);
-        if glows && matches!(method, Method::Sppm | Method::PhotonMap) {
+        if glows && method.lights_by_photons() {
             self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::GlowingSolids(method.name()));
         }

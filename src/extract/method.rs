@@ -37,6 +37,11 @@ impl Method {
         self != Self::Path
     }
 
+    /// Whether photons bring all that is lit at second hand: what no photons start from lights nothing then.
+    pub(crate) fn lights_by_photons(self) -> bool {
+        matches!(self, Self::PhotonMap | Self::Sppm)
+    }
+
     /// Its name, as the record of a run has it.
     pub fn name(self) -> &'static str {
         match self {
@@ -126,8 +131,7 @@ pub(crate) fn method_suffices(
     chosen: Res<ChosenIntegrator>,
     requirements: Res<Requirements>,
 ) -> bool {
-    let by_photons = matches!(chosen.method, Method::Sppm | Method::PhotonMap);
-    !(by_photons && requirements.has(Feature::GlowingSolids))
+    !(chosen.method.lights_by_photons() && requirements.has(Feature::GlowingSolids))
 }
 
 /// Writes [`ChosenIntegrator`] when it is different from before.

@@ -131,16 +131,18 @@ impl PhotonMap {
 
 #[cfg(test)]
 mod tests {
+    use super::super::trace::Chunk;
     use super::*;
     use crate::description::Rgb;
     use crate::sampling::Sampler;
 
     fn store(positions: impl Iterator<Item = Vec3>) -> PhotonStore {
-        let mut store = PhotonStore::default();
-        for (k, p) in positions.enumerate() {
-            store.push(Photon::new(p, Rgb::splat(k as f32), Vec3::Z, Vec3::Z, 1, k % 3 == 0));
-        }
-        store
+        let photons: Vec<Photon> = positions
+            .enumerate()
+            .map(|(k, p)| Photon::new(p, Rgb::splat(k as f32), Vec3::Z, Vec3::Z, 1, k % 3 == 0))
+            .collect();
+        // in lists of uneven length, as the workers leave them
+        PhotonStore { chunks: photons.chunks(700).map(Chunk::of_surfaces).collect() }
     }
 
     fn cloud(n: u32) -> impl Iterator<Item = Vec3> {
