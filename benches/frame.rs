@@ -118,6 +118,7 @@ fn features(c: &mut Criterion) {
         attenuation,
         scattering: None,
         emission: Rgb::ZERO,
+        density: 1.0.into(),
         priority: 0,
     };
     let amber = Attenuation { color: Vec3::new(0.9, 0.6, 0.2), distance: 0.2 };

@@ -6,8 +6,8 @@ use common::Uniforms;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use glam::{Vec2, Vec3};
 use kinora::description::{
-    Channel, Encoding, ImageData, ImagePixels, Material, Metal, Rgb, Texture, TextureFilter,
-    TextureFiltering, Wrap,
+    Channel, Encoding, GridData, ImageData, ImagePixels, Material, Metal, Rgb, Texture,
+    TextureFilter, TextureFiltering, Wrap,
 };
 use kinora::shade::{MaterialTable, Pyramids, TexturePoint, Textures, TransportMode};
 use std::hint::black_box;
@@ -32,6 +32,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
         attenuation: None,
         scattering: None,
         emission: Rgb::ZERO,
+        density: 1.0.into(),
         priority: 0,
     };
     vec![
@@ -113,7 +114,10 @@ fn evaluate(c: &mut Criterion) {
     group.finish();
 }
 
-fn image(pixels: ImagePixels, filter: TextureFilter) -> Texture<Arc<ImageData>, u32> {
+fn image(
+    pixels: ImagePixels,
+    filter: TextureFilter,
+) -> Texture<Arc<ImageData>, Arc<GridData>, u32> {
     Texture::Image {
         file: Arc::new(ImageData { width: 1024, height: 1024, pixels }),
         encoding: Encoding::Srgb,

@@ -1,6 +1,7 @@
 //! The stages of one frame, and [`Simulation`], which runs them.
 
 use crate::build::bvh::{MeshTrees, RestingTree, TopLevel};
+use crate::build::density::Densities;
 use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
@@ -125,6 +126,12 @@ pub enum RenderError {
          `integrator: Path`, or `Auto`"
     )]
     GlowingSolids(&'static str),
+    /// A solid whose density follows a texture has no end.
+    #[error(
+        "`{0}` is endless, and the `density` of its material is a texture: use a shape which ends, such as a `Box`, or an \
+         even density"
+    )]
+    EndlessDensity(String),
     /// A mesh that is divided for the camera would take too much memory.
     #[error(
         "dicing the mesh `{mesh}` takes at least {triangles} triangles, {megabytes} MB, and \
@@ -298,6 +305,11 @@ impl Simulation {
             self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::GlowingSolids(method.name()));
         }
+        if let Some(index) = self.world.resource::<Densities>().endless {
+            let name = self.name_of(index).to_owned();
+            self.world.resource_mut::<Instances>().mark_unseen();
+            return Err(RenderError::EndlessDensity(name));
+        }
         if let Some(refusal) = self.world.resource::<DicingRefused>().0.clone() {
             let name = self.world.get::<Name>(refusal.mesh);
             let mesh = name.map_or_else(String::new, |name| name.as_str().to_owned());
@@ -335,6 +347,7 @@ impl Simulation {
                 .into_iter()
                 .chain(status.warnings)
                 .chain(self.nesting_warnings(&status.counters.nesting, status.counters.rays))
+                .chain(self.density_warning())
                 .collect(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
@@ -433,13 +446,27 @@ impl Simulation {
         self.world.resource::<ChosenIntegrator>().description()
     }
 
+    /// The name of the object of an instance.
+    fn name_of(&self, index: u32) -> &str {
+        let entity = self.world.resource::<Instances>().entity(index);
+        let name = entity.and_then(|entity| self.world.get::<Name>(entity));
+        name.map_or("", |name| name.as_str())
+    }
+
+    /// Whether densities were found above their bounds.
+    fn density_warning(&self) -> Option<String> {
+        let count = self.world.resource::<Densities>().take_exceeded();
+        (count > 0).then(|| {
+            format!(
+                "{count} times a density was found above its bound: the picture is right on average, but noisier there. \
+                 Please report the scene"
+            )
+        })
+    }
+
     /// Where rays found solids nested in a way that cannot be.
     fn nesting_warnings(&self, faults: &NestingFaults, rays: u64) -> Vec<String> {
-        let instances = self.world.resource::<Instances>();
-        let name = |index: u32| {
-            let name = instances.entity(index).and_then(|entity| self.world.get::<Name>(entity));
-            name.map_or("", |name| name.as_str())
-        };
+        let name = |index: u32| self.name_of(index);
         let mut warnings = Vec::new();
         let seldom = faults.count as f64 <= NESTING_BY_CHANCE * rays as f64;
         if let Some((a, b)) = faults.pair.filter(|_| !seldom) {

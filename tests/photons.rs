@@ -5,6 +5,7 @@ mod common;
 use common::scene;
 use glam::{DVec3, Vec3};
 use kinora::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
+use kinora::build::density::Densities;
 use kinora::build::light::{Aim, LightTable, Lights, PhotonNumbers, PhotonSource, ShapeLights};
 use kinora::build::nesting::{NestedGeometry, Solids};
 use kinora::build::photon::{
@@ -73,6 +74,7 @@ impl Tables {
                 geometry: self.geometry(),
                 materials,
                 solids: self.get::<Solids>(),
+                densities: self.get::<Densities>(),
             },
             lights: self.lights(),
             source: &source,

@@ -1,6 +1,7 @@
 //! Structures over the flat arrays: bounding volume hierarchies, the table of lights, photon maps.
 
 pub mod bvh;
+pub mod density;
 pub mod light;
 mod memory;
 pub mod nesting;
@@ -22,6 +23,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(light::ShapeLights::default());
     world.insert_resource(TreeMemory::default());
     world.insert_resource(nesting::Solids::default());
+    world.insert_resource(density::Densities::default());
     let trees = (
         bvh::join_resting_meshes,
         stamp("tree of resting meshes"),
@@ -30,6 +32,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         bvh::rebuild_top_level,
         stamp("top level"),
         (nesting::find_solids, stamp("solids")).chain().run_if(solids_nest),
+        (density::find_densities, stamp("densities")).chain().run_if(densities_vary),
         light::rebuild_light_table,
         light::prepare_shape_lights,
         stamp("light table"),
@@ -44,6 +47,14 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
 fn solids_nest(requirements: Res<crate::extract::Requirements>) -> bool {
     use crate::extract::Feature;
     requirements.has(Feature::NestedDielectrics) || requirements.need_whole()
+}
+
+/// Whether there are solids of uneven density in this frame, or were in the one before.
+fn densities_vary(
+    requirements: Res<crate::extract::Requirements>,
+    densities: Res<density::Densities>,
+) -> bool {
+    requirements.has(crate::extract::Feature::UnevenDensity) || densities.memory() > 0
 }
 
 /// Whether the integrator of this frame works with photons.

@@ -15,12 +15,14 @@
 //! right for water whose only surface is that on top, if nothing else lies between.
 
 use super::bvh::{Hit, MeshTree, MeshTrees, SceneGeometry, SurfacePoint};
+use super::density::Densities;
 use crate::color::wavelength::{self, DrawnWavelength};
 use crate::description::Rgb;
 use crate::extract::{Geometry, Instances, NOTHING, Surfaces, overlapping_pairs, solids};
 use crate::math::{Aabb, Ray, offset_ray_origin};
 use crate::sampling::Sampler;
 use crate::shade::MaterialTable;
+use crate::shade::medium::Passage;
 use crate::shade::nesting::{Inside, NestingFaults, Solid, SolidStack};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -93,6 +95,18 @@ pub struct NestedGeometry<'a> {
     pub materials: &'a MaterialTable,
     /// Which solids may overlap.
     pub solids: &'a Solids,
+    /// Those of uneven density.
+    pub densities: &'a Densities,
+}
+
+impl<'a> NestedGeometry<'a> {
+    /// The way of a ray through the medium that it is in; `None` where its density is even.
+    #[inline]
+    pub fn passage<I: Inside>(&self, inside: &I, ray: &Ray) -> Option<Passage<'a>> {
+        let index = inside.stack()?.first()?.instance;
+        let instance = &self.geometry.instances[index as usize];
+        self.densities.passage((index, instance), self.materials.textures(), ray)
+    }
 }
 
 impl NestedGeometry<'_> {

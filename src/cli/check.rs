@@ -129,15 +129,16 @@ fn meshes(scene: &SceneDescription) -> String {
 }
 
 fn textures(scene: &SceneDescription) -> String {
-    let mut seen = HashSet::new();
+    let (mut images, mut grids) = (HashSet::new(), HashSet::new());
     let memory = |texture: &SceneTexture| match texture {
-        Texture::Image { file, .. } if seen.insert(Arc::as_ptr(file)) => file.memory() as u64,
+        Texture::Image { file, .. } if images.insert(Arc::as_ptr(file)) => file.memory() as u64,
+        Texture::Grid { file, .. } if grids.insert(Arc::as_ptr(file)) => file.memory() as u64,
         _ => 0,
     };
     let bytes: u64 = scene.textures.values().map(memory).sum();
     match scene.textures.len() {
         count if bytes == 0 => count.to_string(),
-        count => format!("{count}, {} of decoded images", format::bytes(bytes)),
+        count => format!("{count}, {} of decoded images and grids", format::bytes(bytes)),
     }
 }
 
@@ -222,7 +223,11 @@ mod tests {
         let line = |label| &lines.iter().find(|(name, _)| *name == label).expect("printed").1;
         assert_eq!(line("shapes"), "4: 3 × mesh, 1 × sphere");
         assert_eq!(line("meshes"), "1 with 7 triangles; 21 over all instances");
-        assert_eq!(line("textures"), "2, 96 B of decoded images", "shared images count once");
+        assert_eq!(
+            line("textures"),
+            "2, 96 B of decoded images and grids",
+            "shared images count once"
+        );
         assert_eq!(line("lights"), "1: 1 × point");
         assert_eq!(line("camera"), "`eye`");
     }

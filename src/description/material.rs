@@ -46,6 +46,9 @@ pub enum Material<R> {
         /// What the inside emits per metre, W·m⁻³·sr⁻¹.
         #[serde(default)]
         emission: Rgb,
+        /// How much of the medium is where: a factor on attenuation, scattering and emission.
+        #[serde(default = "one_scalar")]
+        density: Value<f32, R>,
         /// Where solids overlap, the one of the highest priority is there; the surface of another is
         /// not seen inside it. Among equal ones the solid that the scene names first wins.
         #[serde(default)]
@@ -179,7 +182,7 @@ impl Attenuation {
     }
 }
 
-/// How a solid scatters light inside, evenly everywhere.
+/// How a solid scatters light inside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scattering {
@@ -242,6 +245,7 @@ impl<R> Material<R> {
                 attenuation,
                 scattering,
                 emission,
+                density,
                 priority,
             } => Material::Dielectric {
                 ior,
@@ -250,6 +254,7 @@ impl<R> Material<R> {
                 attenuation,
                 scattering,
                 emission,
+                density: density.map_ref(textures)?,
                 priority,
             },
             Self::ThinGlass { ior, tint } => {
@@ -311,6 +316,9 @@ fn smooth<R>() -> Value<f32, R> {
 }
 fn half_scalar<R>() -> Value<f32, R> {
     Value::Constant(0.5)
+}
+fn one_scalar<R>() -> Value<f32, R> {
+    Value::Constant(1.0)
 }
 fn glass_ior() -> f32 {
     1.5

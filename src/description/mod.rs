@@ -33,8 +33,8 @@ pub use scene::{Displacement, EntityDescription, Relief, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
 pub use texture::{
-    CellFeature, Channel, Encoding, ImageData, ImagePixels, SceneTexture, Texture, TextureFilter,
-    TextureFiltering, Wrap,
+    CellFeature, Channel, Encoding, Falloff, GridData, ImageData, ImagePixels, SceneTexture,
+    Texture, TextureFilter, TextureFiltering, Wrap,
 };
 pub use value::{Rgb, Value};
 pub use waves::{Wave, Waves};

@@ -1,23 +1,24 @@
 //! Textures, as a scene file says them.
 
 use super::{Rgb, Value};
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A texture: a value which varies over a surface.
 ///
-/// Textures form a graph: the colours and numbers of one may be other textures. `I` refers to an image: a path
-/// in a file, decoded data in a world; `R` refers to another texture, as in [`Value`].
+/// Textures form a graph: the colours and numbers of one may be other textures. `I` refers to an image and `G` to a grid:
+/// a path in a file, decoded data in a world; `R` refers to another texture, as in [`Value`].
 ///
-/// Image and pattern textures are functions of uv; solid ones (`Noise`, `Cells`, `Marble`, `Wood`) of the place in the
-/// space of the object, in metres before its transform, so that they move along with it.
+/// Image and pattern textures are functions of uv; solid ones (`Noise`, `Cells`, `Marble`, `Wood`, `Ramp`, `Radial`,
+/// `Grid`) of the place in the space of the object, in metres before its transform, so that they move along with it. In
+/// the inside of a solid, where there is no uv, x and y of the place stand for it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[serde(bound(
-    deserialize = "I: Deserialize<'de>, R: Deserialize<'de>, Value<Rgb, R>: Deserialize<'de>, Value<f32, R>: Deserialize<'de>"
+    deserialize = "I: Deserialize<'de>, G: Deserialize<'de>, R: Deserialize<'de>, Value<Rgb, R>: Deserialize<'de>, Value<f32, R>: Deserialize<'de>"
 ))]
-pub enum Texture<I, R> {
+pub enum Texture<I, G, R> {
     /// An image file.
     Image {
         /// Where the pixels come from.
@@ -194,6 +195,60 @@ pub enum Texture<I, R> {
         #[serde(default = "late_wood")]
         b: Value<Rgb, R>,
     },
+    /// From one value to another along a line in space, and those beyond its ends.
+    Ramp {
+        /// Where `a` is, metres.
+        #[serde(default)]
+        from: Vec3,
+        /// Where `b` is.
+        #[serde(default = "above")]
+        to: Vec3,
+        /// How values lie between the ends.
+        #[serde(default)]
+        falloff: Falloff,
+        /// At `from`.
+        #[serde(default = "black")]
+        a: Value<Rgb, R>,
+        /// At `to`.
+        #[serde(default = "white")]
+        b: Value<Rgb, R>,
+    },
+    /// From one value in the middle of a ball to another at its surface, and that outside.
+    Radial {
+        /// The middle, metres.
+        #[serde(default)]
+        centre: Vec3,
+        /// Metres.
+        #[serde(default = "unit")]
+        radius: f32,
+        /// How values lie between.
+        #[serde(default)]
+        falloff: Falloff,
+        /// In the middle.
+        #[serde(default = "white")]
+        a: Value<Rgb, R>,
+        /// At the surface.
+        #[serde(default = "black")]
+        b: Value<Rgb, R>,
+    },
+    /// Values on a grid in space, interpolated linearly between the centres of its cells; 0 outside.
+    Grid {
+        /// Where the values come from.
+        file: G,
+        /// Sides of the box that they fill, metres; `None`: as the file says.
+        #[serde(default)]
+        size: Option<Vec3>,
+        /// The middle of that box, metres; only with `size`.
+        #[serde(default)]
+        centre: Vec3,
+    },
+    /// Another texture which moves through the space of the object as time goes on.
+    Drift {
+        /// What moves.
+        of: R,
+        /// Metres per second. At 0 s it is where it would be at rest.
+        velocity: Vec3,
+    },
     /// `(1 − amount)·a + amount·b`.
     Mix {
         /// At amount 0.
@@ -256,8 +311,20 @@ pub enum Texture<I, R> {
     VertexColor {},
 }
 
-/// A texture of a scene: images decoded, other textures by name.
-pub type SceneTexture = Texture<Arc<ImageData>, String>;
+/// How values lie between two ends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
+pub enum Falloff {
+    /// `(1 − s)·a + s·b`.
+    #[default]
+    Linear,
+    /// The same with level ends: `3s² − 2s³` for s.
+    Smooth,
+    /// By equal factors over equal distances: `a^(1 − s)·b^s`, as air thins out upwards.
+    Exponential,
+}
+
+/// A texture of a scene: images and grids decoded, other textures by name.
+pub type SceneTexture = Texture<Arc<ImageData>, Arc<GridData>, String>;
 
 /// What of scattered cells a texture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
@@ -328,16 +395,18 @@ pub enum TextureFilter {
     Nearest,
 }
 
-impl<I, R> Texture<I, R> {
-    /// The same texture with its references replaced: `image` for images, `texture` for other textures.
+impl<I, G, R> Texture<I, G, R> {
+    /// The same texture with its references replaced: `image` for images, `grid` for grids, `texture` for other
+    /// textures.
     ///
     /// # Errors
-    /// The first error of either function.
-    pub fn map_refs<J, S, E>(
+    /// The first error of any function.
+    pub fn map_refs<J, H, S, E>(
         self,
         image: impl FnOnce(I, Encoding) -> Result<J, E>,
+        grid: impl FnOnce(G) -> Result<H, E>,
         texture: &mut impl FnMut(R) -> Result<S, E>,
-    ) -> Result<Texture<J, S>, E> {
+    ) -> Result<Texture<J, H, S>, E> {
         Ok(match self {
             Self::Image { file, encoding, wrap, filter, channel, repeat, offset } => {
                 let file = image(file, encoding)?;
@@ -398,6 +467,18 @@ impl<I, R> Texture<I, R> {
                 a: a.map_ref(texture)?,
                 b: b.map_ref(texture)?,
             },
+            Self::Ramp { from, to, falloff, a, b } => {
+                Texture::Ramp { from, to, falloff, a: a.map_ref(texture)?, b: b.map_ref(texture)? }
+            }
+            Self::Radial { centre, radius, falloff, a, b } => Texture::Radial {
+                centre,
+                radius,
+                falloff,
+                a: a.map_ref(texture)?,
+                b: b.map_ref(texture)?,
+            },
+            Self::Grid { file, size, centre } => Texture::Grid { file: grid(file)?, size, centre },
+            Self::Drift { of, velocity } => Texture::Drift { of: texture(of)?, velocity },
             Self::Mix { a, b, amount } => Texture::Mix {
                 a: a.map_ref(texture)?,
                 b: b.map_ref(texture)?,
@@ -423,7 +504,7 @@ impl<I, R> Texture<I, R> {
     pub fn refs(&self) -> impl Iterator<Item = (&'static str, &R)> {
         let none = ("", None);
         let list = match self {
-            Self::Image { .. } | Self::VertexColor {} => [none; 3],
+            Self::Image { .. } | Self::Grid { .. } | Self::VertexColor {} => [none; 3],
             Self::Checker { a, b, .. }
             | Self::Stripes { a, b, .. }
             | Self::Gradient { a, b }
@@ -431,6 +512,8 @@ impl<I, R> Texture<I, R> {
             | Self::Cells { a, b, .. }
             | Self::Marble { a, b, .. }
             | Self::Wood { a, b, .. }
+            | Self::Ramp { a, b, .. }
+            | Self::Radial { a, b, .. }
             | Self::Multiply { a, b } => [("a", a.texture()), ("b", b.texture()), none],
             Self::Bricks { a, b, between, .. } => {
                 [("a", a.texture()), ("b", b.texture()), ("between", between.texture())]
@@ -438,9 +521,10 @@ impl<I, R> Texture<I, R> {
             Self::Mix { a, b, amount } => {
                 [("a", a.texture()), ("b", b.texture()), ("amount", amount.texture())]
             }
-            Self::Remap { of, .. } | Self::Placed { of, .. } | Self::Triplanar { of, .. } => {
-                [("of", Some(of)), none, none]
-            }
+            Self::Remap { of, .. }
+            | Self::Placed { of, .. }
+            | Self::Triplanar { of, .. }
+            | Self::Drift { of, .. } => [("of", Some(of)), none, none],
         };
         list.into_iter().filter_map(|(field, reference)| Some((field, reference?)))
     }
@@ -476,6 +560,29 @@ pub enum ImagePixels {
     Rgba32F(Vec<[f32; 4]>),
 }
 
+/// Numbers on a grid in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridData {
+    /// Cells along x, y and z.
+    pub size: [u32; 3],
+    /// Numbers of each cell: 1, or 3 for a colour.
+    pub channels: u32,
+    /// The numbers, finite and not negative: channels next to each other, then x, then y, then z.
+    pub values: Vec<f32>,
+    /// Corners of the box that the cells fill, metres.
+    pub bounds: (Vec3, Vec3),
+}
+
+impl GridData {
+    /// Bytes of the values.
+    pub fn memory(&self) -> usize {
+        size_of_val(self.values.as_slice())
+    }
+}
+
+fn above() -> Vec3 {
+    Vec3::Y
+}
 fn one_by_one() -> Vec2 {
     Vec2::ONE
 }

@@ -110,9 +110,7 @@ impl Facts<'_> {
             return (Method::Path, "photons cannot start from emitting planes".to_owned());
         }
         let found_by_paths = noise < f64::from(PASSES_FOR_MOTION);
-        let moving = [Feature::Motion, Feature::CameraMotion, Feature::Deformation];
-        let moves = moving.into_iter().any(|feature| requirements.has(feature));
-        if moves && settings.samples < PASSES_FOR_MOTION && found_by_paths {
+        if requirements.need_time() && settings.samples < PASSES_FOR_MOTION && found_by_paths {
             return (
                 Method::Path,
                 format!(

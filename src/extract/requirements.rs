@@ -21,6 +21,8 @@ pub enum Feature {
     Lens,
     /// Meshes whose vertices move within the shutter.
     Deformation,
+    /// Textures which drift while the shutter is open.
+    TextureMotion,
     /// Surfaces with holes.
     Opacity,
     /// Solids which absorb light inside.
@@ -34,6 +36,8 @@ pub enum Feature {
     Scattering,
     /// Solids which glow inside.
     GlowingSolids,
+    /// Solids whose inside is denser here than there.
+    UnevenDensity,
     /// Smooth solids of index 1, such as fog: what is inside matters, and their surfaces are none.
     InvisibleSurfaces,
     /// Light from all around.
@@ -55,6 +59,13 @@ impl Requirements {
         self.features.iter().any(|(f, _)| *f == feature)
     }
 
+    /// Whether anything is different at another time of the shutter.
+    pub fn need_time(&self) -> bool {
+        [Feature::Motion, Feature::CameraMotion, Feature::Deformation, Feature::TextureMotion]
+            .into_iter()
+            .any(|feature| self.has(feature))
+    }
+
     /// Whether paths must know all that can matter in solids: [`Whole`](crate::shade::nesting::Whole).
     pub fn need_whole(&self) -> bool {
         [Feature::Dispersion, Feature::Scattering, Feature::InvisibleSurfaces]
@@ -72,6 +83,7 @@ pub struct Census {
     dispersive: usize,
     scattering: usize,
     glowing: usize,
+    uneven: usize,
     invisible: usize,
     /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
@@ -98,6 +110,8 @@ impl Census {
             census.scattering += if medium.is_some() { count } else { 0 };
             let glows = medium.is_some_and(|medium| medium.emission != Rgb::ZERO);
             census.glowing += if glows { count } else { 0 };
+            let uneven = materials.interior(material).is_some_and(|i| i.density.is_some());
+            census.uneven += if uneven { count } else { 0 };
             let invisible = materials.is_invisible(material, None);
             census.invisible += if invisible { count } else { 0 };
             let specular = !invisible && materials.may_cast_caustics(material, min_alpha);
@@ -158,6 +172,9 @@ pub fn derive_requirements(
     if camera.has_lens() {
         require(Feature::Lens, "the camera has an aperture".to_owned());
     }
+    if surfaces.materials.textures().drift() {
+        require(Feature::TextureMotion, "textures drift in the shutter".to_owned());
+    }
     if census.masked > 0 {
         require(Feature::Opacity, format!("{} objects with a mask", census.masked));
     }
@@ -183,6 +200,10 @@ pub fn derive_requirements(
     if census.glowing > 0 {
         let reason = format!("{} solids which glow inside", census.glowing);
         require(Feature::GlowingSolids, reason);
+    }
+    if census.uneven > 0 {
+        let reason = format!("{} solids of uneven density", census.uneven);
+        require(Feature::UnevenDensity, reason);
     }
     if census.invisible > 0 {
         let reason = format!("{} smooth solids of index 1", census.invisible);

@@ -1,9 +1,9 @@
 //! Materials and textures as tables.
 
 use super::spawn_order;
-use crate::description::{ImageData, Rgb, Value};
+use crate::description::{GridData, ImageData, Rgb, Value};
 use crate::shade::{MaterialTable, TextureNeeds, Textures, cycle, material_cycle};
-use crate::world::{Material, Settings, Texture};
+use crate::world::{FrameClock, Material, Settings, Texture};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
 use std::sync::Arc;
@@ -77,7 +77,7 @@ fn needs_of(
 }
 
 /// A texture whose references are indices.
-type IndexedTexture = crate::description::Texture<Arc<ImageData>, u32>;
+type IndexedTexture = crate::description::Texture<Arc<ImageData>, Arc<GridData>, u32>;
 
 /// Stands in for a texture which cannot be.
 const BLACK_TEXTURE: IndexedTexture = crate::description::Texture::Gradient {
@@ -100,12 +100,14 @@ pub struct SurfaceSlots {
     pub textures: EntityHashMap<u32>,
 }
 
-/// Rebuilds [`Surfaces`] when a texture or a material was added, changed or removed.
+/// Rebuilds [`Surfaces`] when a texture or a material was added, changed or removed, and writes it when textures drift.
 ///
 /// Slots follow the order of the entities, which is that of spawning.
+#[expect(clippy::too_many_arguments, reason = "the signature lists what the tables depend on")]
 pub fn extract_surfaces(
     changed: Query<(), Or<(Changed<Material>, Changed<Texture>)>>,
     settings: Res<Settings>,
+    clock: Res<FrameClock>,
     mut removed: (RemovedComponents<Material>, RemovedComponents<Texture>),
     materials: Query<(Entity, &Material)>,
     textures: Query<(Entity, &Texture)>,
@@ -115,7 +117,11 @@ pub fn extract_surfaces(
     let gone = removed.0.read().count() + removed.1.read().count();
     let filtering = settings.0.texture_filter;
     let textures_now = surfaces.materials.textures();
+    let shutter = clock.shutter();
     if changed.is_empty() && gone == 0 && textures_now.filtering() == filtering {
+        if textures_now.must_go_to(shutter) {
+            surfaces.materials.go_to(shutter);
+        }
         return;
     }
     let pyramids = textures_now.pyramids();
@@ -149,11 +155,12 @@ pub fn extract_surfaces(
     }
     let mut list: Vec<(u32, IndexedTexture)> = Vec::with_capacity(textures.iter().len());
     for (entity, texture) in &textures {
-        let image = |image, _| Ok(image);
-        let indexed = texture.clone().map_refs(image, &mut { texture_of }).unwrap_or_else(|what| {
-            dangling.push(format!("the texture of {entity} refers to {what}"));
-            BLACK_TEXTURE
-        });
+        let (image, grid) = (|image, _| Ok(image), Ok);
+        let indexed =
+            texture.clone().map_refs(image, grid, &mut { texture_of }).unwrap_or_else(|what| {
+                dangling.push(format!("the texture of {entity} refers to {what}"));
+                BLACK_TEXTURE
+            });
         list.push((texture_slots[&entity], indexed));
     }
     list.sort_unstable_by_key(|(slot, _)| *slot);
@@ -164,7 +171,7 @@ pub fn extract_surfaces(
         dangling.push(format!("the texture{name} is made of itself"));
         list[looped as usize] = BLACK_TEXTURE;
     }
-    let textures = Textures::new(list, filtering, &pyramids);
+    let textures = Textures::new(list, filtering, &pyramids).at_time(shutter);
     *surfaces = Surfaces { dangling, ..Surfaces::new(table, textures) };
     slots.set_if_neq(SurfaceSlots { materials: material_slots, textures: texture_slots });
 }

@@ -20,7 +20,6 @@
 //! Using Photon Mapping*, section 9.2.2; Christensen 1999, "Faster Photon Map Global Illumination",
 //! Journal of Graphics Tools 4(3)).
 
-use super::eye_medium::Crossing;
 use super::path::{Arrival, PathCounters, PathTracer};
 use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
@@ -34,6 +33,7 @@ use crate::extract::{CameraRay, Method, NOTHING};
 use crate::film::PixelSample;
 use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
+use crate::shade::medium::Fate;
 use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
@@ -244,9 +244,9 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let hit = self.path.scene.geometry.closest_hit(&walk.ray, f64::INFINITY, from_camera);
         if I::SCATTERS && self.path.medium(&walk.inside).is_some() {
             match self.cross(walk, hit.as_ref(), sampler, context) {
-                Crossing::Through => {}
-                Crossing::Scattered => return ControlFlow::Continue(None),
-                Crossing::Ended => return ControlFlow::Break(()),
+                Fate::Through => {}
+                Fate::Scattered => return ControlFlow::Continue(None),
+                Fate::Ended => return ControlFlow::Break(()),
             }
         }
         if I::NESTS && hit.is_none() {

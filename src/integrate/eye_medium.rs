@@ -6,20 +6,14 @@
 //! a path is, and gathers caustics alone.
 
 use super::eye::{Context, EyeTracer, Since, Walk};
-use super::medium::{Deflection, Flown, Stretch};
+use super::medium::{Deflection, Flown, LOOKS, Stretch};
 use crate::build::bvh::Hit;
 use crate::build::photon::{Photon, VolumeMap};
 use crate::description::{DirectLight, Rgb};
 use crate::extract::Method;
-use crate::sampling::{Sampler, dimension};
+use crate::sampling::{Sampler, Stream, dimension};
+use crate::shade::medium::{Fate, Medium, Profile};
 use crate::shade::nesting::Inside;
-
-/// What became of a path in a medium.
-pub(super) enum Crossing {
-    Through,
-    Scattered,
-    Ended,
-}
 
 impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     /// Takes a path through the medium around it towards what it would hit.
@@ -29,30 +23,32 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         hit: Option<&Hit>,
         sampler: &Sampler,
         context: &mut Context,
-    ) -> Crossing {
-        let end = hit.map_or(f64::INFINITY, |hit| hit.t);
-        let Some(medium) = self.path.medium(&walk.inside) else { return Crossing::Through };
+    ) -> Fate {
         let (ray, inside) = (walk.ray, walk.inside);
-        let stretch = Stretch { medium, ray: &ray, end, inside: &inside, met: walk.met };
+        let Some(stretch) = self.path.stretch(&ray, &inside, hit, walk.met) else {
+            return Fate::Through;
+        };
+        let left = Left::new(&stretch, sampler);
         let scatters = self.method == Method::PathWithPhotons && !walk.last;
         let (light, flown) = if scatters {
             let (light, flown) = self.path.flown(&stretch, walk.depth, sampler, context.counters);
-            (light + self.along(self.maps.volume_caustics, &stretch, walk.depth, |_| true), flown)
+            let caustics = self.maps.volume_caustics;
+            (light + self.along(caustics, &stretch, &left, walk.depth, |_| true), flown)
         } else {
             let light = if walk.last {
                 Rgb::ZERO
             } else {
-                self.gathered_along(walk, &stretch, sampler, context)
+                self.gathered_along(walk, &stretch, &left, sampler, context)
             };
-            (light, Flown::Through(medium.transmittance(end)))
+            (light, Flown::Through(left.at(stretch.end)))
         };
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
         let deflection = match flown {
             Flown::Through(left) => {
                 walk.throughput *= left;
-                return Crossing::Through;
+                return Fate::Through;
             }
-            Flown::Ended => return Crossing::Ended,
+            Flown::Ended => return Fate::Ended,
             Flown::Scattered(deflection) => deflection,
         };
         let Deflection { p, t, wi, pdf, weight, arrival } = deflection;
@@ -67,11 +63,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let roulette = dimension::vertex(walk.met) + dimension::ROULETTE;
         walk.met += 1;
         (walk.ray.o, walk.ray.d, walk.arrival) = (p.as_vec3(), wi, arrival);
-        if self.survives(walk, || sampler.one(roulette)) {
-            Crossing::Scattered
-        } else {
-            Crossing::Ended
-        }
+        if self.survives(walk, || sampler.one(roulette)) { Fate::Scattered } else { Fate::Ended }
     }
 
     /// All light that is scattered towards the path on a stretch, where photons bring it.
@@ -79,23 +71,31 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         &self,
         walk: &Walk<I>,
         stretch: &Stretch<I>,
+        left: &Left,
         sampler: &Sampler,
         context: &mut Context,
     ) -> Rgb {
         let photons_alone =
             self.method == Method::Sppm && self.settings.direct == DirectLight::Photons;
         if walk.reads || photons_alone {
-            return self.along(self.maps.volume, stretch, walk.depth, |_| true);
+            return self.along(self.maps.volume, stretch, left, walk.depth, |_| true);
         }
         let mut light = Rgb::ZERO;
         if walk.depth < self.path.max_depth {
-            light += self.path.scattered_once(stretch, sampler, context.counters);
+            let counters = &mut *context.counters;
+            light += match (left, &stretch.passage) {
+                (Left::Estimated(profile), Some(passage)) => {
+                    let way = (passage, profile);
+                    self.path.scattered_once_across(stretch, way, sampler, counters)
+                }
+                _ => self.path.scattered_once(stretch, sampler, counters),
+            };
         }
         let apart = self.method == Method::PhotonMap;
         let kept = |photon: &Photon| photon.depth > 0 && !(apart && photon.caustic);
-        light += self.along(self.maps.volume, stretch, walk.depth, kept);
+        light += self.along(self.maps.volume, stretch, left, walk.depth, kept);
         if apart {
-            light += self.along(self.maps.volume_caustics, stretch, walk.depth, |_| true);
+            light += self.along(self.maps.volume_caustics, stretch, left, walk.depth, |_| true);
         }
         light
     }
@@ -106,6 +106,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         &self,
         map: &VolumeMap,
         stretch: &Stretch<I>,
+        left: &Left,
         depth: u32,
         kept: impl Fn(&Photon) -> bool,
     ) -> Rgb {
@@ -116,10 +117,35 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         map.along(ray, end as f32, |photon, t, distance2, radius2| {
             if u32::from(photon.depth) < allowed && kept(photon) {
                 let deflected = medium.phase.density(photon.wi().dot(ray.d));
-                let left = medium.transmittance(f64::from(t));
+                let left = left.at(f64::from(t));
                 light += photon.power * left * (deflected * kernel.weight(distance2, radius2));
             }
         });
         light
+    }
+}
+
+/// What is left of the light along a stretch.
+enum Left {
+    Even(Medium),
+    Estimated(Profile),
+}
+
+impl Left {
+    fn new<I>(stretch: &Stretch<I>, sampler: &Sampler) -> Self {
+        let Stretch { medium, passage, end, met, .. } = stretch;
+        let Some(passage) = passage else { return Self::Even(*medium) };
+        let dimensions = dimension::flight(*met);
+        let drawn = [dimension::PIVOT, dimension::BEFORE_DISTANCE];
+        let drawn = drawn.map(|dimension| sampler.one_fine(dimensions + dimension));
+        let least = 2.0 * f64::from(LOOKS);
+        Self::Estimated(Profile::new(medium, passage, *end, least, &mut Stream::new(&drawn)))
+    }
+
+    fn at(&self, t: f64) -> Rgb {
+        match self {
+            Self::Even(medium) => medium.transmittance(t),
+            Self::Estimated(profile) => profile.left(t),
+        }
     }
 }

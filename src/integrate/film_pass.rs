@@ -67,15 +67,12 @@ impl<'a> Job<'a> {
         frame: u32,
         control: &'a RenderControl,
     ) -> Self {
-        let requires = |feature| scene.requirements.has(feature);
         Self {
             settings,
             filter: FilterSampler::new(&settings.filter),
             frame,
-            has_time: requires(Feature::Motion)
-                || requires(Feature::CameraMotion)
-                || requires(Feature::Deformation),
-            has_lens: requires(Feature::Lens),
+            has_time: scene.requirements.need_time(),
+            has_lens: scene.requirements.has(Feature::Lens),
             share: shared_side(settings, scene.requirements),
             control,
         }
@@ -144,6 +141,7 @@ fn shared_side(settings: &RenderSettings, requirements: &Requirements) -> u32 {
     let hindrances = [
         Feature::Motion,
         Feature::Deformation,
+        Feature::TextureMotion,
         Feature::Opacity,
         Feature::Absorption,
         Feature::NestedDielectrics,

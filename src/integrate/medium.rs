@@ -11,18 +11,20 @@ use crate::build::bvh::Hit;
 use crate::build::light::{Pivot, Receiver};
 use crate::description::Rgb;
 use crate::math::Ray;
-use crate::sampling::{Equiangular, Sampler, dimension};
-use crate::shade::medium::{Flight, Medium, ScatteredBefore};
+use crate::sampling::{Equiangular, Sampler, Stream, dimension};
+use crate::shade::medium::{Flight, Medium, Passage, ScatteredBefore};
 use crate::shade::nesting::Inside;
 use glam::{DVec3, Vec2, Vec3};
 
 /// Distances at which a path that is not scattered looks for light: gathering photons costs about as much as so many.
-const LOOKS: u32 = 4;
+pub(super) const LOOKS: u32 = 4;
 
 /// A way through a medium.
 #[derive(Clone, Copy)]
 pub(super) struct Stretch<'s, I> {
     pub(super) medium: Medium,
+    /// The way through it, where its density is uneven.
+    pub(super) passage: Option<Passage<'s>>,
     /// What goes through it, from its beginning.
     pub(super) ray: &'s Ray,
     /// Its length, metres.
@@ -62,14 +64,14 @@ pub(super) enum Aimed {
 }
 
 impl Aimed {
-    fn sample(&self, u: f64) -> f64 {
+    pub(super) fn sample(&self, u: f64) -> f64 {
         match self {
             Self::Towards(lamp) => lamp.sample(u),
             Self::Before(end) => end.sample(u),
         }
     }
 
-    fn pdf(&self, t: f64) -> f64 {
+    pub(super) fn pdf(&self, t: f64) -> f64 {
         match self {
             Self::Towards(lamp) => lamp.pdf(t),
             Self::Before(end) => end.pdf(t),
@@ -105,7 +107,26 @@ impl Ways {
 }
 
 impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
-    /// The medium around a path, if it scatters or glows.
+    /// The way of a path to what it would hit, or to infinity, through the medium around it, if that scatters, glows or
+    /// is uneven.
+    #[inline]
+    pub(super) fn stretch<'s>(
+        &self,
+        ray: &'s Ray,
+        inside: &'s I,
+        hit: Option<&Hit>,
+        met: u32,
+    ) -> Option<Stretch<'s, I>>
+    where
+        'a: 's,
+    {
+        let medium = self.medium(inside)?;
+        let passage = self.scene.nested().passage(inside, ray);
+        let end = hit.map_or(f64::INFINITY, |hit| hit.t);
+        Some(Stretch { medium, passage, ray, end, inside, met })
+    }
+
+    /// The medium around a path, if it scatters, glows or is uneven.
     #[inline]
     pub(super) fn medium(&self, inside: &I) -> Option<Medium> {
         self.scene.surfaces.materials.medium(inside.medium())
@@ -120,10 +141,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> Option<bool> {
-        let medium = self.medium(&path.inside)?;
-        let end = hit.map_or(f64::INFINITY, |hit| hit.t);
         let (ray, inside) = (path.ray, path.inside);
-        let stretch = Stretch { medium, ray: &ray, end, inside: &inside, met: path.met };
+        let stretch = self.stretch(&ray, &inside, hit, path.met)?;
         let (light, flown) = self.flown(&stretch, path.depth, sampler, counters);
         path.radiance += self.limited(path.throughput * light, path.depth);
         let deflection = match flown {
@@ -159,7 +178,10 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> (Rgb, Flown) {
-        let Stretch { medium, ray, end, met, .. } = *stretch;
+        if let Some(passage) = &stretch.passage {
+            return self.flown_across(stretch, passage, depth, sampler, counters);
+        }
+        let Stretch { medium, end, met, .. } = *stretch;
         let dimensions = dimension::vertex(met);
         let mut gathered = Rgb::ZERO;
         if medium.emission != Rgb::ZERO {
@@ -171,33 +193,50 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             let t =
                 aimed.sample(sampler.one_fine(dimension::flight(met) + dimension::PIVOT_DISTANCE));
             let ways = Ways { flown: medium.density(t), aimed: aimed.pdf(t), goes_on: true };
-            let seen = (t, dimension::PIVOT_LIGHT);
+            let seen = (t, medium.scattered(t), dimension::PIVOT_LIGHT);
             gathered += self.light_from(stretch, seen, (ways, ways.aimed), sampler, counters);
         }
         let flown = medium.fly(end, sampler.one_fine(dimensions + dimension::DISTANCE));
         let Flight { scattered_at: Some(t), weight } = flown else {
             return (gathered, Flown::Through(flown.weight));
         };
-        if !may_scatter {
-            counters.truncated += 1;
-        }
-        if !may_scatter || weight == Rgb::ZERO {
-            return (gathered, Flown::Ended);
-        }
-        let p = ray.at(t);
-        let receiver = receiver(p, ray);
         let aimed = aimed.map_or(0.0, |aimed| aimed.pdf(t));
         let ways = Ways { flown: medium.density(t), aimed, goes_on: true };
+        let scattered = (t, weight, may_scatter.then_some(ways));
+        let (light, flown) = self.deflected(stretch, scattered, sampler, counters);
+        (gathered + light, flown)
+    }
+
+    /// A path has scattered at a distance with a weight: the light of one connection from there, and where it goes on.
+    /// `ways` led there; `None` where paths are cut off.
+    pub(super) fn deflected(
+        &self,
+        stretch: &Stretch<I>,
+        (t, weight, ways): (f64, Rgb, Option<Ways>),
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> (Rgb, Flown) {
+        let Stretch { medium, ray, met, .. } = *stretch;
+        let dimensions = dimension::vertex(met);
+        counters.truncated += u64::from(ways.is_none());
+        let Some(ways) = ways.filter(|_| weight != Rgb::ZERO) else {
+            return (Rgb::ZERO, Flown::Ended);
+        };
+        let p = ray.at(t);
+        let receiver = receiver(p, ray);
         let (to_scatter, on_light) =
             sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
-        let choose = sampler.one_fine(dimensions + dimension::LIGHT);
-        let light =
-            self.scattered(stretch, &receiver, (choose, on_light), (ways, ways.flown), counters);
-        // The density of the distance is in the weight.
-        gathered += weight * light * ways.flown as f32;
+        let mut light = Rgb::ZERO;
+        if ways.flown > 0.0 {
+            let drawn = (sampler.one_fine(dimensions + dimension::LIGHT), on_light);
+            // The density of the distance is in the weight.
+            light = weight
+                * self.scattered(stretch, &receiver, drawn, (ways, ways.flown), counters)
+                * ways.flown as f32;
+        }
         let (wi, pdf) = medium.phase.sample(ray.d, to_scatter);
         let arrival = Arrival::Drawn { from: receiver, pdf: pdf / ways.together() };
-        (gathered, Flown::Scattered(Deflection { p, t, wi, pdf, weight, arrival }))
+        (light, Flown::Scattered(Deflection { p, t, wi, pdf, weight, arrival }))
     }
 
     /// Light which is scattered once on a stretch, for a path that is not scattered there itself: from a few distances, one in
@@ -221,13 +260,14 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             let u = sampler.one_fine(flight + dimension::BEFORE_DISTANCE);
             for look in 0..LOOKS {
                 let t = before.sample((f64::from(look) + u) / f64::from(LOOKS));
-                let (ways, seen) = (ways(t), (t, dimension::BEFORE_LIGHT + 3 * look));
+                let seen = (t, stretch.medium.scattered(t), dimension::BEFORE_LIGHT + 3 * look);
+                let ways = ways(t);
                 light += self.light_from(stretch, seen, (ways, ways.flown), sampler, counters);
             }
         }
         if let Aimed::Towards(lamp) = &aimed {
             let t = lamp.sample(sampler.one_fine(flight + dimension::PIVOT_DISTANCE));
-            let (ways, seen) = (ways(t), (t, dimension::PIVOT_LIGHT));
+            let (ways, seen) = (ways(t), (t, stretch.medium.scattered(t), dimension::PIVOT_LIGHT));
             light += self.light_from(stretch, seen, (ways, ways.aimed), sampler, counters);
         }
         light
@@ -253,17 +293,16 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         }
     }
 
-    /// Light of one connection, by the numbers from `dimensions` on, that is scattered towards the beginning of a stretch at a
-    /// distance which was drawn there with the density `own`.
+    /// Light of one connection, by the numbers from `dimensions` on, from a distance of a stretch which was drawn with the
+    /// density `own`; `scattered` of it goes towards the beginning.
     pub(super) fn light_from(
         &self,
         stretch: &Stretch<I>,
-        (t, dimensions): (f64, u32),
+        (t, scattered, dimensions): (f64, Rgb, u32),
         (ways, own): (Ways, f64),
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> Rgb {
-        let scattered = stretch.medium.scattered(t);
         if scattered == Rgb::ZERO {
             return Rgb::ZERO;
         }
@@ -275,7 +314,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
 
     /// Light which arrives at a point of a stretch straight from a light and is deflected along it, by one connection:
     /// per metre, over the density of the distance.
-    fn scattered(
+    pub(super) fn scattered(
         &self,
         stretch: &Stretch<I>,
         receiver: &Receiver,
@@ -291,32 +330,46 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let density = stretch.medium.phase.density(light.wi.dot(stretch.ray.d));
         let (shadow_ray, end) = light.shadow_ray(receiver, time);
         counters.rays += 1;
-        let left = self.transmitted(&shadow_ray, end, stretch.inside);
+        let mut numbers = numbers(choose, on_light);
+        let left = self.transmitted(&shadow_ray, end, stretch.inside, &mut numbers);
         let weight = ways.share(own, (!light.delta).then_some(light.pdf), density);
         light.radiance * left * (density * weight / light.pdf)
     }
 
     /// Share of the light which is left along a segment that begins inside `inside`: what holes let pass, times what
     /// is not absorbed or scattered on the way. Surfaces between equal indices are none.
-    pub(super) fn transmitted(&self, shadow_ray: &Ray, end: f64, inside: &I) -> Rgb {
+    pub(super) fn transmitted(
+        &self,
+        shadow_ray: &Ray,
+        end: f64,
+        inside: &I,
+        numbers: &mut Stream,
+    ) -> Rgb {
         let mut left = Rgb::ONE;
-        let passed = self.passed(shadow_ray, end, inside, |inside, distance| {
-            left *= self.left_after(inside, distance);
+        let passed = self.passed(shadow_ray, end, inside, |inside, ray, end| {
+            left *= self.left_after(inside, ray, end, numbers);
         });
         left * passed
     }
 
-    /// Share of light which is left after a distance in metres in what is around a path.
-    pub(super) fn left_after(&self, inside: &I, distance: f64) -> Rgb {
-        match self.medium(inside) {
-            Some(medium) => medium.transmittance(distance),
-            None => self.transmittance(inside, distance),
+    /// Share of light which is left at a parameter of a ray in what is around it.
+    fn left_after(&self, inside: &I, ray: &Ray, end: f64, numbers: &mut Stream) -> Rgb {
+        let distance = end * ray.d.as_dvec3().length();
+        let Some(medium) = self.medium(inside) else { return self.transmittance(inside, distance) };
+        match self.scene.nested().passage(inside, ray) {
+            Some(passage) => medium.left_across(&passage, distance, numbers),
+            None => medium.transmittance(distance),
         }
     }
 }
 
+/// The numbers for tracking towards a light, from those that chose it.
+pub(super) fn numbers(choose: f64, on_light: Vec2) -> Stream {
+    Stream::new(&[choose, f64::from(on_light.x), f64::from(on_light.y)])
+}
+
 /// A point of a medium which receives light from all around.
-fn receiver(p: DVec3, ray: &Ray) -> Receiver {
+pub(super) fn receiver(p: DVec3, ray: &Ray) -> Receiver {
     Receiver {
         p,
         p_error: DVec3::ZERO,

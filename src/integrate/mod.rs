@@ -9,6 +9,7 @@ mod photon_passes;
 mod radius;
 mod scene_view;
 mod share;
+mod uneven;
 mod vertex;
 
 pub use film_pass::{IntegrateStatus, render_film};

@@ -14,6 +14,7 @@
 //! survive, which keeps the mean.
 
 use super::SceneView;
+use super::medium::numbers;
 use super::share::{Departure, Landing, SharedPath};
 use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
@@ -530,7 +531,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let inside = sides.towards(light.wi, vertex);
         if I::SCATTERS {
             let weight = if light.delta { 1.0 } else { power_heuristic(light.pdf, pdf) };
-            let left = self.transmitted(&shadow_ray, end, inside);
+            let mut numbers = numbers(choose, on_light);
+            let left = self.transmitted(&shadow_ray, end, inside, &mut numbers);
             return f_cos * light.radiance * left * (weight / light.pdf);
         }
         let visible = self.visible(&shadow_ray, end, inside);
@@ -552,17 +554,18 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         if !OPACITY && !I::NESTS {
             return if self.scene.geometry.occluded(shadow_ray, end) { 0.0 } else { 1.0 };
         }
-        self.passed(shadow_ray, end, inside, |_, _| {})
+        self.passed(shadow_ray, end, inside, |_, _, _| {})
     }
 
     /// Follows a segment from surface to surface: the share of the light that holes let through; surfaces inside of other
-    /// solids let all of it. `flown` is told what is around each part of the way, and its length in metres.
+    /// solids let all of it. `flown` is told what is around each part of the way, the ray, and its parameter
+    /// at the end.
     pub(super) fn passed(
         &self,
         shadow_ray: &Ray,
         end: f64,
         inside: &I,
-        mut flown: impl FnMut(&I, f64),
+        mut flown: impl FnMut(&I, &Ray, f64),
     ) -> f32 {
         // What is found wrong is counted on the paths.
         let (mut inside, mut faults) = (*inside, NestingFaults::default());
@@ -570,7 +573,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let target = shadow_ray.at(if end.is_finite() { end } else { 1.0 });
         let mut ray = *shadow_ray;
         while let Some(hit) = self.scene.geometry.closest_hit(&ray, end, false) {
-            flown(&inside, hit.t * ray.d.as_dvec3().length());
+            flown(&inside, &ray, hit.t);
             let surface = match self.scene.nested().meet(&ray, hit, &mut inside, &mut faults) {
                 Meeting::Nothing { surface, beyond } => {
                     inside = beyond;
@@ -598,7 +601,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 }
             }
         }
-        flown(&inside, end * ray.d.as_dvec3().length());
+        flown(&inside, &ray, end);
         passed
     }
 

@@ -1,6 +1,7 @@
 //! The tables of a frame, together, as an integrator sees them.
 
 use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
+use crate::build::density::Densities;
 use crate::build::light::{LightTable, Lights, ShapeLights};
 use crate::build::nesting::{NestedGeometry, Solids};
 use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
@@ -20,6 +21,7 @@ pub struct SceneTables<'w> {
     camera: Res<'w, ViewCamera>,
     requirements: Res<'w, Requirements>,
     solids: Res<'w, Solids>,
+    densities: Res<'w, Densities>,
 }
 
 /// The scene of a frame: arrays and indices, read-only.
@@ -37,6 +39,8 @@ pub struct SceneView<'a> {
     pub requirements: &'a Requirements,
     /// Which solids may overlap.
     pub solids: &'a Solids,
+    /// Solids of uneven density.
+    pub densities: &'a Densities,
 }
 
 impl<'a> SceneView<'a> {
@@ -47,6 +51,7 @@ impl<'a> SceneView<'a> {
             geometry: self.geometry,
             materials: &self.surfaces.materials,
             solids: self.solids,
+            densities: self.densities,
         }
     }
 }
@@ -72,6 +77,7 @@ impl SceneTables<'_> {
             camera: &self.camera,
             requirements: &self.requirements,
             solids: &self.solids,
+            densities: &self.densities,
         }
     }
 }

@@ -226,7 +226,7 @@ fn unit(x: u32) -> f32 {
 
 /// A bijective mixing of 64 bits, the finaliser of `SplitMix64` (Steele, Lea and Flood 2014).
 #[inline]
-fn mix(mut x: u64) -> u64 {
+pub(super) fn mix(mut x: u64) -> u64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     x ^ (x >> 31)

@@ -5,7 +5,7 @@
 //! of its own carries a [`Material`]; one that shares it points there with [`MadeOf`].
 
 use crate::description::modelling::View;
-use crate::description::{self, Clock, ImageData, TriangleMesh};
+use crate::description::{self, Clock, GridData, ImageData, TriangleMesh};
 use crate::math::Aabb;
 use bevy_ecs::component::{Mutable, RequiredComponentsRegistrator, StorageType};
 use bevy_ecs::prelude::*;
@@ -19,7 +19,7 @@ pub use description::{Acceleration, Keyframes, LookAt, Transform, Velocity};
 /// What a surface is made of.
 pub type Material = description::Material<Entity>;
 /// A texture.
-pub type Texture = description::Texture<Arc<ImageData>, Entity>;
+pub type Texture = description::Texture<Arc<ImageData>, Arc<GridData>, Entity>;
 /// The form of an object.
 pub type Shape = description::Shape<Entity>;
 /// Light which leaves the surface of a shape.

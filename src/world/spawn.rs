@@ -46,7 +46,7 @@ pub fn spawn_scene(world: &mut World, scene: &SceneDescription) -> SceneEntities
     for (name, texture) in &scene.textures {
         let image = |image: Arc<ImageData>, _| Ok(image);
         let mut part = |name: String| Ok(entity(&spawned.textures, &name));
-        let texture: Texture = sure(texture.clone().map_refs(image, &mut part));
+        let texture: Texture = sure(texture.clone().map_refs(image, Ok, &mut part));
         world.entity_mut(spawned.textures[name]).insert(texture);
     }
     for (name, mesh) in &scene.meshes {

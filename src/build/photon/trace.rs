@@ -22,7 +22,6 @@
 //! drawn.
 
 use super::Photon;
-use super::fly::Flown;
 use crate::build::bvh::SurfacePoint;
 use crate::build::light::{Aim, EmittedPhoton, Lights, PhotonNumbers, PhotonSource};
 use crate::build::nesting::{Meeting, NestedGeometry};
@@ -30,6 +29,7 @@ use crate::description::Rgb;
 use crate::extract::NOTHING;
 use crate::math::{Cone, Frame, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
+use crate::shade::medium::Fate;
 use crate::shade::nesting::{Inside, NestingFaults, SolidStack};
 use crate::shade::{Bsdf, BsdfSample, TransportMode};
 use glam::{Vec2, Vec3};
@@ -272,9 +272,9 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             let hit = geometry.closest_hit(&walk.ray, f64::INFINITY, false);
             if I::SCATTERS {
                 match self.fly(&mut walk, hit.as_ref(), sampler, &mut photons.media, counters) {
-                    Flown::Through => {}
-                    Flown::Scattered => continue,
-                    Flown::Ended => return,
+                    Fate::Through => {}
+                    Fate::Scattered => continue,
+                    Fate::Ended => return,
                 }
             }
             let Some(hit) = hit else {

@@ -1,6 +1,7 @@
-//! Reads the files that a scene names: images and triangle meshes.
+//! Reads the files that a scene names: images, grids and triangle meshes.
 //!
 //! - [`image`](load_image): PNG, JPEG, Radiance HDR, OpenEXR; known by their contents, not by name;
+//! - [`grid`](load_grid): numbers in space, `.vol`;
 //! - `obj`: Wavefront OBJ; `polygon` cuts its faces into triangles;
 //! - `gltf`: the geometry of glTF 2.0, as `.gltf` or `.glb`; `accessor` reads its numbers,
 //!   `gather` puts its parts together;
@@ -12,11 +13,13 @@
 mod accessor;
 mod gather;
 mod gltf;
+mod grid;
 mod image;
 mod obj;
 mod polygon;
 mod tidy;
 
+pub use grid::{MAX_GRID_VALUES, load_grid};
 pub use image::load_image;
 
 use super::TriangleMesh;
@@ -74,6 +77,8 @@ pub enum AssetError {
         path = .path.display()
     )]
     Pixel { path: PathBuf, found: String, column: usize, row: usize, count: usize, of: usize },
+    #[error("`{path}` is not a sound grid: {message}", path = .path.display())]
+    Grid { path: PathBuf, message: String },
     #[error("`{path}`, line {line}: {message}", path = .path.display())]
     Obj { path: PathBuf, line: usize, message: String },
     #[error("`{path}`: {message}", path = .path.display())]

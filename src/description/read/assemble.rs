@@ -10,13 +10,14 @@ use super::patches::{bezier_mesh, spline_mesh};
 use super::profile::read_profile;
 use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
+use super::texture::read_texture;
 use super::waves::check_waves;
 use super::{ContentHash, LoadOptions, Names, entity, relations};
-use crate::description::assets::{MAX_FILE_BYTES, load_image, load_mesh};
+use crate::description::assets::{MAX_FILE_BYTES, load_grid, load_image, load_mesh};
 use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
 use crate::description::modelling::{grid, subdivided};
 use crate::description::{
-    Clock, Displacement, Encoding, Filter, ImageData, PhotonSettings, RenderSettings,
+    Clock, Displacement, Encoding, Filter, GridData, ImageData, PhotonSettings, RenderSettings,
     SceneDescription, SceneTexture, Texture, TriangleMesh, Waves,
 };
 use crate::math::Profile;
@@ -80,9 +81,15 @@ pub(super) fn assemble(
     if complete {
         relations::choose_camera(&mut scene, definitions.camera.as_ref(), names, options, report);
     }
-    let mut assets = Assets { options, hash, images: HashMap::new(), meshes: HashMap::new() };
+    let mut assets = Assets {
+        options,
+        hash,
+        images: HashMap::new(),
+        grids: HashMap::new(),
+        meshes: HashMap::new(),
+    };
     for (name, cursor) in &names.textures {
-        let texture = surface::read_texture(cursor, names, report);
+        let texture = read_texture(cursor, names, report);
         if let Some(texture) = texture.and_then(|t| assets.texture(cursor, t, &mut scene, report)) {
             scene.textures.insert(name.clone(), texture);
         }
@@ -348,6 +355,7 @@ struct Assets<'o> {
     options: &'o LoadOptions,
     hash: ContentHash,
     images: HashMap<(PathBuf, Encoding), Arc<ImageData>>,
+    grids: HashMap<PathBuf, Arc<GridData>>,
     meshes: HashMap<PathBuf, Arc<TriangleMesh>>,
 }
 
@@ -403,11 +411,15 @@ impl Assets<'_> {
     fn texture(
         &mut self,
         cursor: &Cursor,
-        texture: Texture<String, String>,
+        texture: Texture<String, String, String>,
         scene: &mut SceneDescription,
         report: &mut Report,
     ) -> Option<SceneTexture> {
         let place = cursor.at("file");
+        let grid = match &texture {
+            Texture::Grid { file, .. } => self.grid(&place, file, scene, report),
+            _ => None,
+        };
         let image = |name: String, encoding: Encoding| {
             let path = self.find(&place, &name, scene, report).ok_or(())?;
             let key = (path, encoding);
@@ -420,7 +432,28 @@ impl Assets<'_> {
             })?;
             Ok(self.images.entry(key).or_insert(Arc::new(image)).clone())
         };
-        texture.map_refs(image, &mut Ok).ok()
+        texture.map_refs(image, |_| grid.ok_or(()), &mut Ok).ok()
+    }
+
+    fn grid(
+        &mut self,
+        place: &Cursor,
+        name: &str,
+        scene: &mut SceneDescription,
+        report: &mut Report,
+    ) -> Option<Arc<GridData>> {
+        let path = self.find(place, name, scene, report)?;
+        if let Some(grid) = self.grids.get(&path) {
+            return Some(grid.clone());
+        }
+        match load_grid(&path) {
+            Ok(grid) => Some(self.grids.entry(path).or_insert(Arc::new(grid)).clone()),
+            Err(error) => {
+                let message = format!("this grid cannot be used: {error}");
+                report.at("scene::asset", place, message);
+                None
+            }
+        }
     }
 
     /// Makes a mesh and, before it, those that it is made from; each once.

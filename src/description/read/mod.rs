@@ -26,6 +26,7 @@ mod source;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod texture;
 mod waves;
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};

@@ -245,7 +245,7 @@ fn greatest(texture: &SceneTexture, scene: &SceneDescription, depth: usize) -> f
         Value::Texture(name) => of(name),
     };
     match texture {
-        Texture::Image { .. } | Texture::VertexColor {} => 0.0,
+        Texture::Image { .. } | Texture::Grid { .. } | Texture::VertexColor {} => 0.0,
         Texture::Checker { a, b, .. }
         | Texture::Stripes { a, b, .. }
         | Texture::Gradient { a, b }
@@ -253,11 +253,15 @@ fn greatest(texture: &SceneTexture, scene: &SceneDescription, depth: usize) -> f
         | Texture::Cells { a, b, .. }
         | Texture::Marble { a, b, .. }
         | Texture::Wood { a, b, .. }
+        | Texture::Ramp { a, b, .. }
+        | Texture::Radial { a, b, .. }
         | Texture::Mix { a, b, .. } => value(a).max(value(b)),
         Texture::Bricks { a, b, between, .. } => value(a).max(value(b)).max(value(between)),
         Texture::Multiply { a, b } => value(a) * value(b),
         Texture::Remap { to, .. } => to.0.max(to.1),
-        Texture::Placed { of: name, .. } | Texture::Triplanar { of: name, .. } => of(name),
+        Texture::Placed { of: name, .. }
+        | Texture::Triplanar { of: name, .. }
+        | Texture::Drift { of: name, .. } => of(name),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Textures, materials and meshes: their numbers, and the names they use.
+//! Materials and meshes: their numbers, and the names they use.
 
 use super::Names;
 use super::decode::{Report, decode};
@@ -9,8 +9,8 @@ use crate::description::assets::MAX_MESH_ELEMENTS;
 use crate::description::diagnostic::suggestion;
 use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
 use crate::description::{
-    Curve, Dispersion, Displacement, Material, PhaseFunction, Relief, Rgb, Shape, Texture,
-    TriangleMesh, Value, Wave,
+    Curve, Dispersion, Displacement, Material, PhaseFunction, Relief, Rgb, Shape, TriangleMesh,
+    Value, Wave,
 };
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
@@ -184,7 +184,7 @@ impl Parameters<'_, '_> {
         }
     }
 
-    fn scalar(&mut self, field: &str, value: &Value<f32, String>) {
+    pub(super) fn scalar(&mut self, field: &str, value: &Value<f32, String>) {
         let place = self.cursor.at(field);
         match value {
             Value::Constant(share) => {
@@ -198,15 +198,20 @@ impl Parameters<'_, '_> {
         limits::number(self.report, &self.cursor.at(field), value, limits);
     }
 
-    fn colors<const N: usize>(&mut self, values: [(&str, &Value<Rgb, String>); N]) {
+    pub(super) fn colors<const N: usize>(&mut self, values: [(&str, &Value<Rgb, String>); N]) {
         for (field, value) in values {
             self.color(field, value, &limits::STRENGTH);
         }
     }
 
-    fn uv(&mut self, field: &str, value: Vec2) {
+    pub(super) fn uv(&mut self, field: &str, value: Vec2) {
         let uv = value.to_array().map(f64::from);
         limits::vector(self.report, &self.cursor.at(field), &uv, &limits::UV);
+    }
+
+    pub(super) fn place(&mut self, field: &str, value: Vec3) {
+        let value = value.to_array().map(f64::from);
+        limits::vector(self.report, &self.cursor.at(field), &value, &limits::COORDINATE);
     }
 
     pub(super) fn rgb(&mut self, field: &str, value: Rgb, limits: &Limits) {
@@ -242,6 +247,7 @@ pub(super) fn read_material(
             attenuation,
             scattering,
             emission,
+            density,
             priority: _,
         } => {
             let fine = limits::number(check.report, &cursor.at("ior"), *ior, &limits::IOR);
@@ -264,6 +270,13 @@ pub(super) fn read_material(
                 }
             }
             check.rgb("emission", *emission, &limits::STRENGTH);
+            let place = cursor.at("density");
+            match density {
+                Value::Constant(density) => {
+                    limits::number(check.report, &place, *density, &limits::STRENGTH);
+                }
+                Value::Texture(name) => check.texture(&place, name),
+            }
         }
         Material::ThinGlass { ior, tint } => {
             check.number("ior", *ior, &limits::IOR);
@@ -334,96 +347,6 @@ fn check_dispersion(cursor: &Cursor, ior: f32, dispersion: &Dispersion, report: 
         let message = "this dispersion says the index of refraction itself";
         report.at("scene::conflict", &given, message).help = Some("leave out `ior`".to_owned());
     }
-}
-
-/// Reads a texture and checks its numbers and names; its file is only named.
-pub(super) fn read_texture(
-    cursor: &Cursor,
-    names: &Names,
-    report: &mut Report,
-) -> Option<Texture<String, String>> {
-    let texture: Texture<String, String> = decode(cursor, report)?;
-    let mut check = Parameters { cursor, names, report };
-    match &texture {
-        Texture::Image { repeat, offset, .. } => {
-            check.uv("repeat", *repeat);
-            check.uv("offset", *offset);
-        }
-        Texture::Checker { size, a, b } => {
-            check.number("size", *size, &limits::UV_LENGTH);
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Stripes { size, share, a, b } => {
-            check.number("size", *size, &limits::UV_LENGTH);
-            check.number("share", *share, &limits::SHARE);
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Gradient { a, b } | Texture::Multiply { a, b } => {
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Bricks { size, mortar, bevel, shift, period: _, seed: _, a, b, between } => {
-            for (axis, length) in size.to_array().into_iter().enumerate() {
-                let place = cursor.at("size").nth(axis);
-                limits::number(check.report, &place, length, &limits::UV_LENGTH);
-            }
-            check.number("mortar", *mortar, &limits::UV_LENGTH_OR_ZERO);
-            check.number("bevel", *bevel, &limits::UV_LENGTH_OR_ZERO);
-            check.number("shift", *shift, &limits::SHARE);
-            check.colors([("a", a), ("b", b), ("between", between)]);
-        }
-        Texture::Noise { size, octaves, gain, turbulence: _, seed: _, a, b } => {
-            check.number("size", *size, &limits::LENGTH);
-            check.number("octaves", *octaves, &limits::OCTAVES);
-            check.number("gain", *gain, &limits::SHARE);
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Cells { size, shows: _, jitter, seed: _, a, b } => {
-            check.number("size", *size, &limits::LENGTH);
-            check.number("jitter", *jitter, &limits::SHARE);
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Marble { size, distortion, sharpness, seed: _, a, b } => {
-            check.number("size", *size, &limits::LENGTH);
-            check.number("distortion", *distortion, &limits::DISTORTION);
-            check.number("sharpness", *sharpness, &limits::POWER);
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Wood { size, distortion, grain, seed: _, a, b } => {
-            check.number("size", *size, &limits::LENGTH);
-            check.number("distortion", *distortion, &limits::DISTORTION);
-            check.number("grain", *grain, &limits::SHARE);
-            check.colors([("a", a), ("b", b)]);
-        }
-        Texture::Mix { a, b, amount } => {
-            check.colors([("a", a), ("b", b)]);
-            check.scalar("amount", amount);
-        }
-        Texture::Remap { of, from, to, smooth: _ } => {
-            check.texture(&cursor.at("of"), of);
-            for (field, (low, high)) in [("from", from), ("to", to)] {
-                let ends = [*low, *high].map(f64::from);
-                limits::vector(check.report, &cursor.at(field), &ends, &limits::UV);
-            }
-            if from.0 == from.1 {
-                let message =
-                    format!("`from` must be two different numbers, but both are {}", from.0);
-                check.report.at("scene::empty-range", &cursor.at("from"), message);
-            }
-        }
-        Texture::Placed { of, repeat, rotation, offset } => {
-            check.texture(&cursor.at("of"), of);
-            check.uv("repeat", *repeat);
-            check.number("rotation", *rotation, &limits::ANGLE);
-            check.uv("offset", *offset);
-        }
-        Texture::Triplanar { of, size, sharpness } => {
-            check.texture(&cursor.at("of"), of);
-            check.number("size", *size, &limits::LENGTH);
-            check.number("sharpness", *sharpness, &limits::POWER);
-        }
-        Texture::VertexColor {} => {}
-    }
-    Some(texture)
 }
 
 /// Checks a mesh given in the scene.

@@ -2,7 +2,7 @@
 
 use super::relief::Relief;
 use super::{Compiled, Interior, MaterialTable, material_cycle};
-use crate::description::{Material, Rgb, Value, index_at_d};
+use crate::description::{Material, Rgb, Scattering, Value, index_at_d};
 use crate::shade::bsdf::{
     AlbedoTable, ConductorFresnel, ReflectorTable, RoughDielectric, SMOOTH_BELOW_ALPHA, Widths,
     coat_table, dielectric_average, glass_table, reflector_table, reflector_table_at,
@@ -286,16 +286,36 @@ fn solid(index: u32, materials: &[Material<u32>]) -> Option<u32> {
 fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
     let solid = solid(index, materials)?;
     let Material::Dielectric {
-        ior, dispersion, attenuation, scattering, emission, priority, ..
+        ior,
+        dispersion,
+        attenuation,
+        scattering,
+        emission,
+        density,
+        priority,
+        ..
     } = &materials[solid as usize]
     else {
         unreachable!("a solid is a dielectric")
     };
+    // What there is nothing of is not there.
+    let (factor, texture) = match *density {
+        Value::Constant(factor) => (factor, None),
+        Value::Texture(texture) => (1.0, Some(texture)),
+    };
+    let sigma_a = attenuation.filter(|_| factor > 0.0).map(|a| a.sigma_a() * factor);
+    let scattering = scattering.filter(|_| factor > 0.0).map(|scattering| Scattering {
+        coefficient: scattering.coefficient * factor,
+        ..scattering
+    });
+    let emission = *emission * factor;
+    let empty = sigma_a.is_none() && scattering.is_none() && emission == Rgb::ZERO;
     Some(Interior {
         ior: index_at_d(*ior, dispersion.as_ref()),
-        sigma_a: attenuation.map(|attenuation| attenuation.sigma_a()),
-        scattering: *scattering,
-        emission: *emission,
+        sigma_a,
+        scattering,
+        emission,
+        density: texture.filter(|_| !empty),
         priority: *priority,
     })
 }

@@ -52,6 +52,8 @@ pub struct Interior {
     pub scattering: Option<Scattering>,
     /// What the inside emits per metre, W·m⁻³·sr⁻¹.
     pub emission: Rgb,
+    /// The texture whose number is a factor on absorption, scattering and emission, if the density is uneven.
+    pub density: Option<u32>,
     /// Where solids overlap, the one of the highest priority is there.
     pub priority: i32,
 }
@@ -265,16 +267,22 @@ impl MaterialTable {
         }
     }
 
-    /// The medium inside a solid of this material which scatters or glows; `None` for air ([`NOTHING`]) and all others.
+    /// Takes the textures to the time of another frame: when its shutter opens and closes, in seconds.
+    pub fn go_to(&mut self, shutter: (f64, f64)) {
+        self.textures = std::mem::take(&mut self.textures).at_time(shutter);
+    }
+
+    /// The medium inside a solid of this material which scatters, glows or is uneven; `None` for air ([`NOTHING`]) and all
+    /// others.
     #[inline]
     pub fn medium(&self, material: u32) -> Option<Medium> {
         if material == NOTHING {
             return None;
         }
         let interior = self.interior(material)?;
-        let Interior { sigma_a, scattering, emission, .. } = interior;
+        let Interior { sigma_a, scattering, emission, density, .. } = interior;
         let Scattering { coefficient: sigma_s, phase } = scattering.unwrap_or_default();
-        if sigma_s == Rgb::ZERO && emission == Rgb::ZERO {
+        if sigma_s == Rgb::ZERO && emission == Rgb::ZERO && density.is_none() {
             return None;
         }
         let sigma_t = sigma_s + sigma_a.unwrap_or(Rgb::ZERO);

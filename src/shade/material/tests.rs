@@ -23,6 +23,7 @@ fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Materi
         attenuation,
         scattering: None,
         emission: Rgb::ZERO,
+        density: Value::Constant(1.0),
         priority: 0,
     }
 }
@@ -122,6 +123,7 @@ fn solids_know_their_interior() {
             sigma_a: None,
             scattering: None,
             emission: Rgb::ZERO,
+            density: None,
             priority: 0
         })
     );
@@ -221,6 +223,7 @@ fn a_prism_turns_each_line_by_its_angle() {
         attenuation: None,
         scattering: None,
         emission: Rgb::ZERO,
+        density: Value::Constant(1.0),
         priority: 0,
     };
     let table = MaterialTable::new(&[material(glass), material(air)], Textures::default());

@@ -142,6 +142,13 @@ pub(super) fn average(image: &ImageData) -> Rgb {
     (sum / (f64::from(width) * f64::from(height))).as_vec3()
 }
 
+/// Bounds of a channel over all pixels.
+pub(super) fn range(image: &ImageData, wanted: Channel) -> [f32; 2] {
+    let rows = (0..image.height).flat_map(|row| (0..image.width).map(move |column| (column, row)));
+    let values = rows.map(|(column, row)| channel(texel(image, column, row), wanted));
+    values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
+}
+
 /// A coordinate in texels, reduced to about one period so that it converts to an integer.
 #[inline]
 fn texel_coordinate(u: f64, wrap: Wrap, size: u32) -> f64 {

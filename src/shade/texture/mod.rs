@@ -5,17 +5,20 @@
 //! of a sample is replaced by its mean: images by a pyramid, patterns in closed form, noise octave by
 //! octave.
 
+mod grid;
 mod image;
 mod pattern;
 mod point;
 mod pyramid;
+mod range;
 mod solid;
 
 pub use point::TexturePoint;
 pub use pyramid::Pyramid;
+pub use range::{Ranges, Region};
 
 use crate::color::luminance;
-use crate::description::{ImageData, Rgb, Texture, TextureFiltering, Value};
+use crate::description::{Falloff, GridData, ImageData, Rgb, Texture, TextureFiltering, Value};
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
 use pattern::Wall;
 use solid::Octaves;
@@ -23,7 +26,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// A texture as a frame uses it: its pixels shared, other textures by index.
-pub type RenderTexture = Texture<Arc<Pyramid>, u32>;
+pub type RenderTexture = Texture<Arc<Pyramid>, Arc<GridData>, u32>;
 
 /// What a texture is asked for: a colour, or a number.
 trait Sample:
@@ -93,6 +96,8 @@ impl TextureNeeds {
 pub struct Textures {
     list: Vec<RenderTexture>,
     filtering: TextureFiltering,
+    /// Opening and closing of the shutter, seconds.
+    shutter: (f64, f64),
 }
 
 impl Textures {
@@ -102,7 +107,7 @@ impl Textures {
     /// # Panics
     /// If a reference is out of range.
     pub fn new(
-        list: Vec<Texture<Arc<ImageData>, u32>>,
+        list: Vec<Texture<Arc<ImageData>, Arc<GridData>, u32>>,
         filtering: TextureFiltering,
         known: &Pyramids,
     ) -> Self {
@@ -122,13 +127,33 @@ impl Textures {
                     assert!(index < count, "texture {index} of {count}");
                     Ok(index)
                 };
-                match texture.map_refs(&mut image, &mut reference) {
+                match texture.map_refs(&mut image, Ok, &mut reference) {
                     Ok(texture) => texture,
                     Err(never) => match never {},
                 }
             })
             .collect();
-        Self { list, filtering }
+        Self { list, filtering, shutter: (0.0, 0.0) }
+    }
+
+    /// The same at the time of a frame: when its shutter opens and closes, in seconds.
+    #[must_use]
+    pub fn at_time(self, shutter: (f64, f64)) -> Self {
+        Self { shutter, ..self }
+    }
+
+    /// Whether anything is different in the shutter of another frame.
+    pub fn must_go_to(&self, shutter: (f64, f64)) -> bool {
+        self.shutter != shutter && self.have_drift()
+    }
+
+    /// Whether anything drifts while the shutter is open.
+    pub fn drift(&self) -> bool {
+        self.shutter.1 > self.shutter.0 && self.have_drift()
+    }
+
+    fn have_drift(&self) -> bool {
+        self.list.iter().any(|texture| matches!(texture, Texture::Drift { .. }))
     }
 
     /// What is done about fine textures.
@@ -161,6 +186,10 @@ impl Textures {
                 | Texture::Cells { .. }
                 | Texture::Marble { .. }
                 | Texture::Wood { .. }
+                | Texture::Ramp { .. }
+                | Texture::Radial { .. }
+                | Texture::Grid { .. }
+                | Texture::Drift { .. }
                 | Texture::Triplanar { .. }
                 | Texture::VertexColor {}
         );
@@ -188,7 +217,10 @@ impl Textures {
         let texture = &self.list[index as usize];
         let own = match texture {
             Texture::Image { file, .. } => (file.base.width, file.base.height),
-            Texture::Mix { .. } | Texture::Multiply { .. } | Texture::Remap { .. } => (1, 1),
+            Texture::Mix { .. }
+            | Texture::Multiply { .. }
+            | Texture::Remap { .. }
+            | Texture::Drift { .. } => (1, 1),
             _ => (1024, 512),
         };
         texture.refs().fold(own, |(width, height), (_, part)| {
@@ -207,10 +239,14 @@ impl Textures {
         self.list.is_empty()
     }
 
-    /// Bytes of all images and their pyramids, each counted once.
+    /// Bytes of all grids, images and their pyramids, each counted once.
     pub fn memory(&self) -> usize {
         let (mut images, mut pyramids, mut bytes) = (HashSet::new(), HashSet::new(), 0);
+        let mut grids = HashSet::new();
         for texture in &self.list {
+            if let Texture::Grid { file, .. } = texture {
+                bytes += if grids.insert(Arc::as_ptr(file)) { file.memory() } else { 0 };
+            }
             let Texture::Image { file, .. } = texture else { continue };
             bytes += if pyramids.insert(Arc::as_ptr(file)) { file.memory() } else { 0 };
             let image = &file.base;
@@ -251,6 +287,25 @@ impl Textures {
             self.value(b, at)
         } else {
             self.value::<T>(a, at) * (1.0 - share) + self.value::<T>(b, at) * share
+        }
+    }
+
+    /// From `a` at a share of 0 to `b` at 1.
+    fn fall<T: Sample>(
+        &self,
+        [a, b]: [&Value<Rgb, u32>; 2],
+        share: f64,
+        falloff: Falloff,
+        at: &TexturePoint,
+    ) -> T {
+        let share = share.clamp(0.0, 1.0);
+        match falloff {
+            Falloff::Linear => self.mix([a, b], share as f32, at),
+            Falloff::Smooth => self.mix([a, b], pattern::smooth(share), at),
+            Falloff::Exponential => {
+                let (a, b): (T, T) = (self.value(a, at), self.value(b, at));
+                a.each(|a| a.powf((1.0 - share) as f32)) * b.each(|b| b.powf(share as f32))
+            }
         }
     }
 
@@ -303,6 +358,23 @@ impl Textures {
             }
             Texture::Wood { size, distortion, grain, seed, a, b } => {
                 self.mix([a, b], solid::wood(at, *size, *distortion, *grain, *seed), at)
+            }
+            Texture::Ramp { from, to, falloff, a, b } => {
+                let (from, way) = (from.as_dvec3(), (*to - *from).as_dvec3());
+                let share = (at.p - from).dot(way) / way.length_squared();
+                self.fall([a, b], share, *falloff, at)
+            }
+            Texture::Radial { centre, radius, falloff, a, b } => {
+                let share = at.p.distance(centre.as_dvec3()) / f64::from(*radius);
+                self.fall([a, b], share, *falloff, at)
+            }
+            Texture::Grid { file, size, centre } => {
+                T::of_color(grid::Placed::new(file, *size, *centre).at(at.p))
+            }
+            Texture::Drift { of, velocity } => {
+                let (open, close) = self.shutter;
+                let seconds = open + (close - open) * f64::from(at.time);
+                self.sample(*of, &at.moved(velocity.as_dvec3() * -seconds))
             }
             Texture::Mix { a, b, amount } => {
                 let amount = match *amount {

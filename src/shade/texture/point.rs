@@ -19,12 +19,40 @@ pub struct TexturePoint {
     pub axes: [Vec2; 2],
     /// Its greatest diameter, metres in the space of the object.
     pub width: f32,
+    /// Time in the shutter, from 0 to 1.
+    pub time: f32,
+    /// Whether it is a place inside a solid, where x and y stand for uv.
+    pub is_inside: bool,
 }
 
 impl TexturePoint {
     /// A point of which nothing is known but uv; textures are not filtered there.
     pub const fn at(uv: Vec2) -> Self {
-        Self { uv, p: DVec3::ZERO, n: Vec3::Z, color: Rgb::ONE, axes: [Vec2::ZERO; 2], width: 0.0 }
+        Self {
+            uv,
+            p: DVec3::ZERO,
+            n: Vec3::Z,
+            color: Rgb::ONE,
+            axes: [Vec2::ZERO; 2],
+            width: 0.0,
+            time: 0.0,
+            is_inside: false,
+        }
+    }
+
+    /// A place inside a solid at a time in the shutter: x and y stand for uv.
+    pub fn inside(p: DVec3, time: f32) -> Self {
+        Self { p, time, is_inside: true, ..Self::at(p.truncate().as_vec2()) }
+    }
+
+    /// The same point at another place; inside a solid uv goes along.
+    #[must_use]
+    pub(super) fn moved(mut self, by: DVec3) -> Self {
+        self.p += by;
+        if self.is_inside {
+            self.uv = self.p.truncate().as_vec2();
+        }
+        self
     }
 
     /// The same point with other surface coordinates: `m·uv + offset`.

@@ -23,6 +23,11 @@ static GRADIENT: LazyLock<FastNoiseLite> = LazyLock::new(|| {
 /// over a million places.
 const MEAN_MAGNITUDE: f32 = 0.2118;
 
+/// How steep gradient noise is along an axis at most: the values of opposite corners of a lattice cell differ by 2, when their
+/// gradients lie across the axis, and the weights between them grow by at most 15/8 per unit; times the scale of the
+/// library, which makes the greatest value 1.
+const STEEPEST: f64 = 2.0 * 1.875 * 0.965;
+
 /// Gradient noise at a place, one of many by `seed`.
 #[inline]
 fn gradient(p: DVec3, seed: u32) -> f32 {
@@ -62,6 +67,31 @@ impl Octaves {
             frequency *= 2.0;
         }
         if total > 0.0 { sum / total } else { 0.0 }
+    }
+}
+
+impl Octaves {
+    /// Bounds of [`Octaves::at`] without a footprint, in a box of this half size around a place.
+    pub(super) fn range(&self, middle: DVec3, half: DVec3) -> [f32; 2] {
+        let (mut range, mut total) = ([0.0, 0.0], 0.0);
+        let (mut strength, mut frequency) = (1.0_f32, 1.0_f64);
+        for octave in 0..self.count {
+            let reach = (STEEPEST * frequency * half.element_sum()) as f32;
+            let [mut low, mut high] = [-1.0_f32, 1.0];
+            if reach < 2.0 {
+                let here = gradient(middle * frequency, self.seed.wrapping_add(octave));
+                (low, high) = (low.max(here - reach), high.min(here + reach));
+            }
+            if self.turbulence {
+                let least = if low < 0.0 && high > 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+                (low, high) = (least, low.abs().max(high.abs()));
+            }
+            range = [range[0] + strength * low, range[1] + strength * high];
+            total += strength;
+            strength *= self.gain;
+            frequency *= 2.0;
+        }
+        if total > 0.0 { range.map(|end| end / total) } else { range }
     }
 }
 
@@ -150,6 +180,19 @@ mod tests {
         assert!((mean - f64::from(MEAN_MAGNITUDE)).abs() < 2e-3, "{mean}");
         let octaves = Octaves { count: 5, gain: 0.5, turbulence: true, seed: 1 };
         assert!((octaves.at(place(1), 100.0) - MEAN_MAGNITUDE).abs() < 1e-6);
+    }
+
+    /// Oracle: differences along an axis over a million places.
+    #[test]
+    fn noise_is_not_steeper_than_its_bound() {
+        let h = 1e-4;
+        let steepest = (0..1_000_000)
+            .map(|k| {
+                let p = place(k);
+                f64::from((gradient(p + DVec3::X * h, 7) - gradient(p, 7)).abs()) / h
+            })
+            .fold(0.0, f64::max);
+        assert!((0.75 * STEEPEST..STEEPEST).contains(&steepest), "{steepest}");
     }
 
     /// Noise is continuous, has both signs, stays in its range, and seeds give others.
