@@ -116,6 +116,7 @@ fn features(c: &mut Criterion) {
         dispersion: None,
         roughness: 0.0.into(),
         attenuation,
+        absorption: None,
         scattering: None,
         emission: Rgb::ZERO,
         density: 1.0.into(),

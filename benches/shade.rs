@@ -30,6 +30,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
         dispersion: None,
         roughness: roughness.into(),
         attenuation: None,
+        absorption: None,
         scattering: None,
         emission: Rgb::ZERO,
         density: 1.0.into(),

@@ -129,6 +129,66 @@ fn media_glow() {
     render(&ball, (16, 16), 1024).mean().assert_agrees("scattering", expected, 3e-3);
 }
 
+/// A camera on the border of a medium is in what it looks into: of a box of 3 m, of a ball of 2 m across the middle, and of nothing
+/// when it looks away; along the border nothing goes wrong.
+#[test]
+fn a_camera_may_stand_on_the_border() {
+    let shapes = [("Box(size: (9, 9, 3))", -1.5, 3.0), ("Sphere(radius: 1)", -1.0, 2.0)];
+    for (shape, centre, depth) in shapes {
+        for (towards, expected) in [
+            ((0.0, 0.0, -1.0), Some(f64::exp(-0.5 * depth))),
+            ((0.0, 0.0, 1.0), Some(1.0)),
+            ((1.0, 0.0, 0.0), None),
+        ] {
+            for (x, z) in [(0.0, 0.0), (0.1, 300.1)] {
+                let (tx, ty, tz) = towards;
+                let text = in_fog(
+                    "",
+                    &fog(0.0, 0.5, 0.0),
+                    &format!(
+                        r#""camera": (transform: (translation: ({x}, 0, {z}), look_at: ({}, {ty}, {})), camera: (fov: 1)),
+                        "mist": (transform: (translation: ({x}, 0, {})), shape: {shape}, material: "fog"),
+                        "sky": (light: Sky(radiance: 1))"#,
+                        x + tx,
+                        z + tz,
+                        z + centre
+                    ),
+                );
+                let seen = render(&text, (4, 4), 4);
+                let mean = seen.mean().mean;
+                match expected {
+                    // The view is a degree wide: the way is longer towards its corners by 1/cos, at most 8e-5.
+                    Some(expected) => {
+                        let error = (mean / expected - 1.0).abs();
+                        assert!(error < 0.5 * depth * 8e-5 + 4e-6, "{shape} {towards:?}: {mean}");
+                    }
+                    None => assert!((0.0..=1.0 + 1e-6).contains(&mean), "{shape}: {mean}"),
+                }
+                assert!(seen.report.warnings.is_empty(), "{:?}", seen.report.warnings);
+            }
+        }
+    }
+}
+
+/// A sheet of stone as thin as can be: what it scatters comes back out, what it absorbs is between nothing and what it
+/// should be, and every ray that enters it leaves it.
+#[test]
+fn a_medium_may_have_no_thickness() {
+    for (sigma_s, sigma_a) in [(1e9, 0.0), (0.0, 50.0)] {
+        let text = in_fog(
+            "",
+            &fog(sigma_s, sigma_a, 0.0),
+            r#""camera": (transform: (translation: (0.3, 0.2, 4), look_at: (0, 0, 0)), camera: (fov: 20)),
+            "sheet": (transform: (rotation: (10, 20, 30)), shape: Box(size: (9, 9, 1e-12)), material: "fog"),
+            "sky": (light: Sky(radiance: 1))"#,
+        );
+        let seen = render(&text, (8, 8), 64);
+        let mean = seen.mean().mean;
+        assert!((mean - 1.0).abs() < 4e-6, "{sigma_s} {sigma_a}: {mean}");
+        assert!(seen.report.warnings.is_empty(), "{:?}", seen.report.warnings);
+    }
+}
+
 /// Beer and Lambert, channel by channel, of light on a wall which comes and is seen through coloured air: its borders are
 /// none, for the sun as well.
 #[test]

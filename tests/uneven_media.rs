@@ -204,7 +204,7 @@ fn of_seeds(text: &str, size: (u32, u32), samples: u32) -> Estimate {
 #[test]
 fn photons_and_paths_see_the_same_clouds() {
     let text = in_fog(
-        "roulette_depth: 4, max_depth: 30",
+        "roulette_depth: 4, max_depth: 10",
         "scattering: (coefficient: (0.5, 0.4, 0.3), phase: HenyeyGreenstein(0.4)), attenuation: (color: (0.9, 0.9, 0.8))",
         r#""density": Noise(size: 2, octaves: 2, a: 0, b: 2.5)"#,
         r#""camera": (transform: (translation: (0, 1, 5), look_at: (0, 0.2, 0)), camera: (fov: 40)),

@@ -5,13 +5,15 @@
 //! ```text
 //! --quick         smaller meshes, fewer repetitions
 //! --json FILE     the same numbers by the same names
-//! --only A,B      of rays, revolution, build, shapes, motion, samples, textures, frame, growth
+//! --only A,B      of rays, revolution, build, shapes, motion, samples, textures, frame, growth, absent
+//! --before FILE   the program of an earlier commit, to which `absent` compares
 //! --convergence   CPU-seconds of whole renders to a relMSE of 1e-3 (fog: 0.1, 0.05), and their memory
 //! ```
 //!
 //! Speeds are per CPU-second, which a busy machine disturbs less; what is compared runs in turn, and
 //! medians are given. Ratios repeat to a few percent, absolute numbers less well.
 
+mod absent;
 mod builds;
 mod clock;
 mod convergence;
@@ -44,6 +46,7 @@ pub struct Options {
     json: Option<PathBuf>,
     only: Option<Vec<String>>,
     convergence: bool,
+    before: Option<PathBuf>,
 }
 
 impl Options {
@@ -55,6 +58,7 @@ impl Options {
             match word.as_str() {
                 "--quick" => options.quick = true,
                 "--convergence" => options.convergence = true,
+                "--before" => options.before = Some(value()?.into()),
                 "--json" => options.json = Some(value()?.into()),
                 "--only" => options.only = Some(value()?.split(',').map(str::to_owned).collect()),
                 // Cargo says that this is a bench.
@@ -86,7 +90,7 @@ fn main() -> ExitCode {
         }
     };
     let mut report = Report::default();
-    let sections: [(&str, fn(&Options, &mut Report)); 9] = [
+    let sections: [(&str, fn(&Options, &mut Report)); 10] = [
         ("rays", rays::run),
         ("revolution", revolution::run),
         ("build", builds::run),
@@ -96,6 +100,7 @@ fn main() -> ExitCode {
         ("textures", textures::run),
         ("frame", frames::run),
         ("growth", growth::run),
+        ("absent", absent::run),
     ];
     for (name, run) in sections {
         if options.wants(name) {

@@ -6,6 +6,7 @@ pub mod light;
 mod memory;
 pub mod nesting;
 pub mod photon;
+pub mod spectra;
 
 pub(crate) use memory::trees_fit;
 pub use memory::{TreeMemory, forecast_tree_memory};
@@ -24,6 +25,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
     world.insert_resource(TreeMemory::default());
     world.insert_resource(nesting::Solids::default());
     world.insert_resource(density::Densities::default());
+    world.insert_resource(spectra::Spectra::default());
     let trees = (
         bvh::join_resting_meshes,
         stamp("tree of resting meshes"),
@@ -33,6 +35,7 @@ pub(crate) fn install(world: &mut World, frame: &mut Schedule) {
         stamp("top level"),
         (nesting::find_solids, stamp("solids")).chain().run_if(solids_nest),
         (density::find_densities, stamp("densities")).chain().run_if(densities_vary),
+        (spectra::see_spectra, stamp("spectra")).chain().run_if(wavelengths_matter),
         light::rebuild_light_table,
         light::prepare_shape_lights,
         stamp("light table"),
@@ -55,6 +58,14 @@ fn densities_vary(
     densities: Res<density::Densities>,
 ) -> bool {
     requirements.has(crate::extract::Feature::UnevenDensity) || densities.memory() > 0
+}
+
+/// Whether this frame is seen at wavelengths, or the one before was.
+fn wavelengths_matter(
+    requirements: Res<crate::extract::Requirements>,
+    spectra: Res<spectra::Spectra>,
+) -> bool {
+    requirements.has(crate::extract::Feature::Spectra) || !spectra.surfaces.is_empty()
 }
 
 /// Whether the integrator of this frame works with photons.

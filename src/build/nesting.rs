@@ -12,13 +12,15 @@
 //!
 //! # Where a ray begins
 //! A solid is around a point if a ray straight up from there leaves it before it enters it. That is also
-//! right for water whose only surface is that on top, if nothing else lies between.
+//! right for water whose only surface is that on top, if nothing else lies between. Where a shape is closed
+//! whatever its measures are, the ray that begins there is asked instead: on the border itself, where the point
+//! is neither inside nor outside, the ray is in what it goes through first.
 
 use super::bvh::{Hit, MeshTree, MeshTrees, SceneGeometry, SurfacePoint};
 use super::density::Densities;
 use crate::color::wavelength::{self, DrawnWavelength};
 use crate::description::Rgb;
-use crate::extract::{Geometry, Instances, NOTHING, Surfaces, overlapping_pairs, solids};
+use crate::extract::{Geometry, Instance, Instances, NOTHING, Surfaces, overlapping_pairs, solids};
 use crate::math::{Aabb, Ray, offset_ray_origin};
 use crate::sampling::Sampler;
 use crate::shade::MaterialTable;
@@ -48,6 +50,10 @@ struct Entry {
     solid: Solid,
     bounds: Aabb,
     is_mesh: bool,
+    /// Whether it is a shape which is always closed.
+    is_closed: bool,
+    /// Whether it is thinner than what rays which leave its surface are rounded to.
+    is_thin: bool,
     /// The tree of a mesh which has none of its own, being in that of the resting meshes.
     tree: Option<Arc<MeshTree>>,
     /// First and last of its neighbours.
@@ -209,7 +215,7 @@ impl NestedGeometry<'_> {
         crossings: &mut [Crossing; 1 + MOST_AT_ONCE],
     ) -> usize {
         let (first, last) = entry.neighbours;
-        if first == last {
+        if first == last && !entry.is_thin {
             return 1;
         }
         let surface = &mut crossings[0].surface;
@@ -220,6 +226,19 @@ impl NestedGeometry<'_> {
         let probe = Ray { o: near, d: far - near, time: ray.time };
         let ends = Aabb::from_points([near, far]);
         let mut count = 1;
+        if entry.is_thin && crossings[0].entering {
+            // Seen from beyond, the far side is what is met first.
+            let back = Ray { o: far, d: near - far, time: ray.time };
+            if let Some(hit) = self.hit(entry, &back, 1.0) {
+                let mut surface = self.geometry.surface(&back, &hit);
+                if back.d.dot(surface.ng) < 0.0 {
+                    surface.p_error += p_error + (surface.p - p).abs();
+                    let solid = entry.solid;
+                    crossings[count] = Crossing { hit, surface, solid, entering: false };
+                    count += 1;
+                }
+            }
+        }
         for &other in &self.solids.neighbours[first as usize..last as usize] {
             let other = &self.solids.list[other as usize];
             if count > MOST_AT_ONCE || !crate::extract::overlap(&other.bounds, &ends) {
@@ -262,15 +281,28 @@ impl NestedGeometry<'_> {
         if !(disperses(material) || outside.is_some_and(disperses)) {
             return Rgb::ONE;
         }
-        let DrawnWavelength { nm, weight } = wavelength::draw(sampler.one(dimension));
+        let u = sampler.one(dimension);
+        let DrawnWavelength { nm, weight } = match self.materials.wavelengths() {
+            None => wavelength::draw(u),
+            Some(set) => set.draw(u),
+        };
         (*here, *beyond) = (here.tuned(nm), beyond.tuned(nm));
         weight
     }
 
-    /// The solids around a point.
-    pub fn around(&self, p: Vec3, time: f32) -> SolidStack {
+    /// The solids around a point, in whatever direction rays begin there; `None` where that matters.
+    pub fn all_around(&self, p: Vec3, time: f32) -> Option<SolidStack> {
+        // Along no face or axis that a scene is likely to have.
+        let d = Vec3::new(0.36, 0.48, 0.8);
+        let [one, other] = [d, -d].map(|d| self.around(&Ray { o: p, d, time }));
+        (one == other).then_some(one)
+    }
+
+    /// The solids around the point where a ray begins.
+    pub fn around(&self, ray: &Ray) -> SolidStack {
         let mut stack = SolidStack::default();
-        let ray = Ray { o: p, d: Vec3::Y, time };
+        let p = ray.o;
+        let up = Ray { d: Vec3::Y, ..*ray };
         for entry in &self.solids.list {
             let closed = entry.bounds.contains(p);
             let below = entry.is_mesh && {
@@ -280,9 +312,10 @@ impl NestedGeometry<'_> {
             if !(closed || below) {
                 continue;
             }
-            let leaves = |hit: &Hit| self.geometry.surface(&ray, hit).ng.y > 0.0;
-            let Some(hit) = self.hit(entry, &ray, f64::INFINITY).filter(leaves) else { continue };
-            let first = || self.geometry.closest_hit(&ray, hit.t.next_up(), false);
+            let way = if entry.is_closed { ray } else { &up };
+            let leaves = |hit: &Hit| self.geometry.surface(way, hit).ng.dot(way.d) > 0.0;
+            let Some(hit) = self.hit(entry, way, f64::INFINITY).filter(leaves) else { continue };
+            let first = || self.geometry.closest_hit(way, hit.t.next_up(), false);
             if closed || first().is_none_or(|first| first.instance == hit.instance) {
                 // Without room it is the lowest in rank that is not known of.
                 stack.enter(entry.solid);
@@ -302,6 +335,22 @@ impl NestedGeometry<'_> {
             faults.add(solid.instance, stack.first().map(|first| first.instance));
         }
     }
+}
+
+/// Whether a shape is so thin that a ray which begins on one side of it, rounded to `f32`, may be on the other.
+fn is_thin(instance: &Instance) -> bool {
+    /// Units in the last place of a coordinate that the beginning of a ray is off by.
+    const ROUNDED: f64 = 64.0;
+    if matches!(instance.geometry, Geometry::Mesh(_)) || !instance.bounds.min.is_finite() {
+        return false;
+    }
+    let forward = instance.motion.at(0.0).matrix3;
+    // From side to side, as far as the plane of the other two axes is away.
+    let volume = forward.determinant().abs();
+    let [x, y, z] = [forward.x_axis, forward.y_axis, forward.z_axis];
+    let widest = x.cross(y).length().max(y.cross(z).length()).max(z.cross(x).length());
+    let spacing = f64::from(instance.bounds.reach()) * f64::from(f32::EPSILON);
+    volume / widest < ROUNDED * spacing
 }
 
 /// Writes [`Solids`] when objects or materials changed.
@@ -326,8 +375,20 @@ pub fn find_solids(
                 Geometry::Mesh(mesh) => table.tree_of(&meshes.list[mesh as usize]),
                 Geometry::Primitive(_) => None,
             };
-            let is_mesh = matches!(instance.geometry, Geometry::Mesh(_));
-            Entry { solid, bounds: instance.bounds, is_mesh, tree, neighbours: (0, 0) }
+            let is_thin = is_thin(instance);
+            let (is_mesh, is_closed) = match &instance.geometry {
+                Geometry::Mesh(_) => (true, false),
+                Geometry::Primitive(primitive) => (false, primitive.is_closed()),
+            };
+            Entry {
+                solid,
+                bounds: instance.bounds,
+                is_mesh,
+                is_closed,
+                is_thin,
+                tree,
+                neighbours: (0, 0),
+            }
         })
         .collect();
     let mut places = vec![NOTHING; instances.list.len()];

@@ -4,6 +4,7 @@
 //! are proportional to light. Display codes appear only when a file of codes is read or written.
 
 mod blackbody;
+pub mod spectrum;
 pub mod srgb;
 pub mod tone;
 pub mod wavelength;

@@ -49,7 +49,7 @@ pub(super) fn matching(nm: f64) -> DVec3 {
 }
 
 /// Linear Rec. 709 of light of one wavelength, outside of the gamut and not normalised.
-fn spectral_color(nm: f64) -> DVec3 {
+pub(super) fn spectral_color(nm: f64) -> DVec3 {
     rec_709(matching(nm))
 }
 

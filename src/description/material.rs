@@ -40,6 +40,9 @@ pub enum Material<R> {
         /// Absorption inside; `None` is perfectly clear.
         #[serde(default)]
         attenuation: Option<Attenuation>,
+        /// Absorption by wavelength, per metre, in place of `attenuation`: a texture which is a spectrum.
+        #[serde(default = "nothing")]
+        absorption: Option<R>,
         /// Scattering inside; `None`: light goes straight on.
         #[serde(default)]
         scattering: Option<Scattering>,
@@ -243,6 +246,7 @@ impl<R> Material<R> {
                 dispersion,
                 roughness,
                 attenuation,
+                absorption,
                 scattering,
                 emission,
                 density,
@@ -252,6 +256,7 @@ impl<R> Material<R> {
                 dispersion,
                 roughness: roughness.map_ref(textures)?,
                 attenuation,
+                absorption: absorption.map(&mut *textures).transpose()?,
                 scattering,
                 emission,
                 density: density.map_ref(textures)?,
@@ -316,6 +321,9 @@ fn smooth<R>() -> Value<f32, R> {
 }
 fn half_scalar<R>() -> Value<f32, R> {
     Value::Constant(0.5)
+}
+fn nothing<R>() -> Option<R> {
+    None
 }
 fn one_scalar<R>() -> Value<f32, R> {
     Value::Constant(1.0)

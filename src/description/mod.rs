@@ -14,6 +14,7 @@ mod read;
 mod scene;
 mod settings;
 mod shape;
+mod spectrum;
 mod texture;
 mod value;
 mod waves;
@@ -32,6 +33,7 @@ pub use read::{LoadOptions, load_scene, parse_scene_str};
 pub use scene::{Displacement, EntityDescription, Relief, SceneDescription};
 pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
 pub use shape::{Shape, TriangleMesh};
+pub use spectrum::SpectrumData;
 pub use texture::{
     CellFeature, Channel, Encoding, Falloff, GridData, ImageData, ImagePixels, SceneTexture,
     Texture, TextureFilter, TextureFiltering, Wrap,

@@ -45,6 +45,8 @@ pub struct RenderSettings {
     /// Trades the independence of the noise of neighbouring pixels, and shadow rays, for less of it; no
     /// bias.
     pub share: u32,
+    /// Whether paths carry wavelengths also where no spectrum asks for them.
+    pub spectral: bool,
     /// How light is simulated.
     pub integrator: IntegratorChoice,
     /// Where caustics come from with the integrator `Path`.
@@ -94,6 +96,7 @@ impl Default for RenderSettings {
             roulette_depth: 2,
             roulette_gain: 2.5,
             share: 4,
+            spectral: false,
             integrator: IntegratorChoice::Auto,
             caustics: Caustics::default(),
             photons: PhotonSettings::default(),

@@ -1,6 +1,6 @@
 //! Textures, as a scene file says them.
 
-use super::{Rgb, Value};
+use super::{Rgb, SpectrumData, Value};
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -307,6 +307,14 @@ pub enum Texture<I, G, R> {
         #[serde(default = "triplanar_sharpness")]
         sharpness: f32,
     },
+    /// The same everywhere, by wavelength. Within another texture its colour counts.
+    Spectrum {
+        /// Values at wavelengths in nm.
+        values: SpectrumData,
+        /// Multiplies the values.
+        #[serde(default = "unit")]
+        scale: f32,
+    },
     /// The colours at the corners of a mesh, interpolated; white where there are none.
     VertexColor {},
 }
@@ -496,6 +504,7 @@ impl<I, G, R> Texture<I, G, R> {
             Self::Triplanar { of, size, sharpness } => {
                 Texture::Triplanar { of: texture(of)?, size, sharpness }
             }
+            Self::Spectrum { values, scale } => Texture::Spectrum { values, scale },
             Self::VertexColor {} => Texture::VertexColor {},
         })
     }
@@ -504,7 +513,10 @@ impl<I, G, R> Texture<I, G, R> {
     pub fn refs(&self) -> impl Iterator<Item = (&'static str, &R)> {
         let none = ("", None);
         let list = match self {
-            Self::Image { .. } | Self::Grid { .. } | Self::VertexColor {} => [none; 3],
+            Self::Image { .. }
+            | Self::Grid { .. }
+            | Self::Spectrum { .. }
+            | Self::VertexColor {} => [none; 3],
             Self::Checker { a, b, .. }
             | Self::Stripes { a, b, .. }
             | Self::Gradient { a, b }

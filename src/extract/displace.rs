@@ -182,7 +182,7 @@ fn moved(
             ..TexturePoint::at(mesh.uvs.get(k).copied().unwrap_or(Vec2::ZERO))
         };
         let outward = outward[weld.place[k] as usize].normalize_or_zero();
-        let vector = || (textures.color(texture, &at).as_dvec3() - middle) * strength;
+        let vector = || (textures.vector(texture, &at).as_dvec3() - middle) * strength;
         match displacement.says {
             Relief::Height => {
                 outward * ((f64::from(textures.scalar(texture, &at)) - middle) * strength)

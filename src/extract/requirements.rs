@@ -1,10 +1,10 @@
 //! What a scene requires, with the reason; everything else is left out of the work.
 
 use super::{
-    Instances, Meshes, NOTHING, PunctualLight, PunctualLights, Surfaces, ViewCamera, may_enclose,
-    overlapping_pairs, solids,
+    Emissions, Instances, Meshes, NOTHING, PunctualLight, PunctualLights, Surfaces, ViewCamera,
+    may_enclose, overlapping_pairs, solids,
 };
-use crate::description::{Light, Rgb};
+use crate::description::{Light, Rgb, Value};
 use crate::math::Aabb;
 use crate::shade::MaterialTable;
 use crate::world::{Deformation, Name, Settings, Shape, ShutterMotion, VertexMotion};
@@ -40,6 +40,8 @@ pub enum Feature {
     UnevenDensity,
     /// Smooth solids of index 1, such as fog: what is inside matters, and their surfaces are none.
     InvisibleSurfaces,
+    /// Spectra: paths must carry wavelengths in place of red, green and blue.
+    Spectra,
     /// Light from all around.
     Sky,
     /// Light which reaches diffuse surfaces or media through mirrors or glass.
@@ -84,6 +86,7 @@ pub struct Census {
     scattering: usize,
     glowing: usize,
     uneven: usize,
+    spectral: usize,
     invisible: usize,
     /// Those which may cast caustics, and those on which photons may be gathered.
     specular: usize,
@@ -110,6 +113,7 @@ impl Census {
             census.scattering += if medium.is_some() { count } else { 0 };
             let glows = medium.is_some_and(|medium| medium.emission != Rgb::ZERO);
             census.glowing += if glows { count } else { 0 };
+            census.spectral += if materials.has_spectrum(material) { count } else { 0 };
             let uneven = materials.interior(material).is_some_and(|i| i.density.is_some());
             census.uneven += if uneven { count } else { 0 };
             let invisible = materials.is_invisible(material, None);
@@ -130,6 +134,7 @@ pub fn derive_requirements(
     instances: Res<Instances>,
     meshes: Res<Meshes>,
     surfaces: Res<Surfaces>,
+    emissions: Res<Emissions>,
     lights: Res<PunctualLights>,
     camera: Res<ViewCamera>,
     settings: Res<Settings>,
@@ -141,6 +146,7 @@ pub fn derive_requirements(
 ) {
     let rewritten = instances.is_changed();
     let looks = surfaces.is_changed() || lights.is_changed() || camera.is_changed();
+    let looks = looks || (emissions.is_changed() && emissions.restructured);
     if !(rewritten || looks || meshes.is_changed() || settings.is_changed()) {
         return;
     }
@@ -208,6 +214,22 @@ pub fn derive_requirements(
     if census.invisible > 0 {
         let reason = format!("{} smooth solids of index 1", census.invisible);
         require(Feature::InvisibleSurfaces, reason);
+    }
+    let textures = surfaces.materials.textures();
+    let is_spectrum = |texture: u32| textures.is_spectrum(texture);
+    let shining = instances.list.iter().filter_map(|i| emissions.texture(i.emission));
+    let sky = |light: &PunctualLight| match light.light {
+        Light::Sky { radiance: Value::Texture(texture), .. } => Some(texture),
+        _ => None,
+    };
+    let shining = shining.chain(lights.0.iter().filter_map(sky));
+    let shining = shining.filter(|texture| is_spectrum(*texture)).count();
+    if settings.0.spectral {
+        require(Feature::Spectra, "the setting `spectral`".to_owned());
+    } else if census.spectral + shining > 0 {
+        let objects = census.spectral;
+        let reason = format!("{objects} objects and {shining} lights with spectra");
+        require(Feature::Spectra, reason);
     }
     let skies = lights.0.iter().filter(|l| matches!(l.light, Light::Sky { .. })).count();
     if skies > 0 {

@@ -1,6 +1,7 @@
 //! Materials and textures as tables.
 
 use super::spawn_order;
+use crate::color::spectrum::WavelengthSet;
 use crate::description::{GridData, ImageData, Rgb, Value};
 use crate::shade::{MaterialTable, TextureNeeds, Textures, cycle, material_cycle};
 use crate::world::{FrameClock, Material, Settings, Texture};
@@ -35,6 +36,18 @@ impl Surfaces {
         let needs = needs_of(&materials, &textures);
         let materials = MaterialTable::new(&materials, textures);
         Self { materials, default_material, needs, dangling: Vec::new() }
+    }
+
+    /// The same seen at the wavelengths of a set.
+    #[must_use]
+    pub fn seen_at(&self, set: &'static WavelengthSet) -> Self {
+        let materials = self.materials.seen_at(set);
+        Self {
+            materials,
+            default_material: self.default_material,
+            needs: self.needs.clone(),
+            dangling: self.dangling.clone(),
+        }
     }
 
     /// What the textures of a material, by index or [`super::NOTHING`], need to know of a point beside

@@ -1,6 +1,7 @@
 //! The film and the tiles that are merged into it.
 
 use super::{FirstHit, PixelSample, Tile, moments};
+use crate::color::spectrum::WavelengthSet;
 use crate::description::{Layer, Rgb};
 use glam::{DVec2, DVec3};
 use std::collections::TryReserveError;
@@ -193,6 +194,21 @@ impl TileBuffer {
     /// # Panics
     /// When the pixel lies outside the tile.
     pub fn add(&mut self, x: u32, y: u32, sample: &PixelSample) {
+        self.add_seen(x, y, sample, None);
+    }
+
+    /// The same for a sample that was seen at wavelengths, if it was: it is dropped by what was found there. Its colour may
+    /// have a negative channel.
+    ///
+    /// # Panics
+    /// When the pixel lies outside the tile.
+    pub fn add_seen(
+        &mut self,
+        x: u32,
+        y: u32,
+        sample: &PixelSample,
+        seen_at: Option<&WavelengthSet>,
+    ) {
         let tile = self.tile;
         assert!(
             (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y),
@@ -203,12 +219,14 @@ impl TileBuffer {
             self.non_finite += 1;
             return;
         }
-        self.sums.push(index, sample.radiance);
+        let to_rgb = |seen: Rgb| seen_at.map_or(seen, |set| set.to_rgb * seen);
+        self.sums.push(index, to_rgb(sample.radiance));
         if !self.sums.hits.is_empty()
             && let Some(hit) = &sample.first_hit
         {
             if is_finite(hit) {
-                self.sums.push_hit(index, hit);
+                let hit = FirstHit { albedo: to_rgb(hit.albedo), ..*hit };
+                self.sums.push_hit(index, &hit);
             } else {
                 self.non_finite += 1;
             }

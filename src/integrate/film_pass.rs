@@ -166,7 +166,9 @@ impl<'a> Begin<'a> {
             return Some(I::new(&SolidStack::default()));
         }
         let eye = self.scene.camera.reach();
-        (eye.max - eye.min == Vec3::ZERO).then(|| I::new(&self.scene.nested().around(eye.min, 0.0)))
+        let rests = eye.max - eye.min == Vec3::ZERO;
+        let around = rests.then(|| self.scene.nested().all_around(eye.min, 0.0)).flatten();
+        around.map(|stack| I::new(&stack))
     }
 
     /// What a sample stands for at the camera, half way through the shutter: the more samples, the less, down to
@@ -245,8 +247,11 @@ fn render_pixels<const OPACITY: bool, I: Inside>(
     for y in tile.y0..tile.y1 {
         for x in tile.x0..tile.x1 {
             for index in 0..job.settings.samples {
-                let (sampler, camera_ray) = job.begin(&tracer.scene, (x, y), index);
-                buffer.add(x, y, &tracer.sample(&camera_ray, &sampler, &mut counters));
+                let scene = tracer.scene.of_sample(index);
+                let tracer = PathTracer { scene, ..*tracer };
+                let (sampler, camera_ray) = job.begin(&scene, (x, y), index);
+                let sample = tracer.sample(&camera_ray, &sampler, &mut counters);
+                buffer.add_seen(x, y, &sample, scene.surfaces.materials.wavelengths());
             }
         }
         let samples = u64::from(tile.x1 - tile.x0) * u64::from(job.settings.samples);
@@ -270,7 +275,11 @@ fn render_groups<const OPACITY: bool, I: Inside>(
     let mut pixels = Vec::with_capacity(LARGEST_GROUP);
     let mut paths = Vec::with_capacity(LARGEST_GROUP);
     let corner = Sampler::new(job.settings.seed, job.frame, (tile.x0, tile.y0), u32::MAX);
+    let all = tracer;
     for index in 0..job.settings.samples {
+        // Paths which share see the scene at the same wavelengths.
+        let tracer = &PathTracer { scene: all.scene.of_sample(index), ..*all };
+        let seen_at = tracer.scene.surfaces.materials.wavelengths();
         let shift = corner.two(index);
         let columns = groups(tile.x0, tile.x1, job.share, shift.x);
         let rows = groups(tile.y0, tile.y1, job.share, shift.y);
@@ -285,7 +294,7 @@ fn render_groups<const OPACITY: bool, I: Inside>(
                 }
                 tracer.connect::<LARGEST_GROUP>(&mut paths, &mut counters);
                 for (path, (x, y)) in paths.drain(..).zip(pixels.drain(..)) {
-                    buffer.add(x, y, &path.sample);
+                    buffer.add_seen(x, y, &path.sample, seen_at);
                 }
             }
         }

@@ -196,7 +196,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
     /// What a camera ray begins in.
     #[inline]
     pub(super) fn start(&self, ray: &Ray) -> I {
-        self.start.unwrap_or_else(|| I::new(&self.scene.nested().around(ray.o, ray.time)))
+        self.start.unwrap_or_else(|| I::new(&self.scene.nested().around(ray)))
     }
 
     /// The radiance which arrives along a camera ray.

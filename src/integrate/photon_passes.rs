@@ -224,10 +224,11 @@ impl<'a> Setting<'a> {
             && (scatters || self.storable.contains(&true))
     }
 
-    fn tracer<const O: bool, I: Inside>(&self, keep: Keep) -> PhotonTracer<'_, O, I> {
+    fn tracer<const O: bool, I: Inside>(&self, keep: Keep, pass: u32) -> PhotonTracer<'_, O, I> {
+        let scene = self.seen_in(pass);
         PhotonTracer {
-            scene: self.scene.nested(),
-            lights: self.scene.lights,
+            scene: scene.nested(),
+            lights: scene.lights,
             source: self.source,
             aim: self.aim.as_ref().filter(|_| keep == Keep::Caustics),
             storable: &self.storable,
@@ -236,6 +237,11 @@ impl<'a> Setting<'a> {
             keep,
             inside: PhantomData,
         }
+    }
+
+    /// The scene as photons and paths of a pass see it: in a spectral scene at the same wavelengths.
+    fn seen_in(&self, pass: u32) -> SceneView<'a> {
+        self.scene.of_sample(pass)
     }
 
     /// What is kept in the map of everything.
@@ -264,7 +270,7 @@ impl<'a> Setting<'a> {
         let keeps = [self.global_keep(), self.has_caustic_map().then_some(Keep::Caustics)];
         let mut kept: u64 = 0;
         for keep in keeps.into_iter().flatten() {
-            let tracer = self.tracer::<O, I>(keep);
+            let tracer = self.tracer::<O, I>(keep, 0);
             let counters = tracer.trace_pass(&pilot, &mut scratch.store, &self.job.control.cancel);
             kept += counters.map_or(0, |counters| counters.stored);
         }
@@ -319,7 +325,7 @@ impl<'a> Setting<'a> {
         let mut take = |keep: Keep, build: &mut dyn FnMut(&PhotonStore)| {
             let start = Instant::now();
             let counters: PhotonCounters =
-                self.tracer::<O, I>(keep).trace_pass(pass, store, cancel)?;
+                self.tracer::<O, I>(keep, pass.pass).trace_pass(pass, store, cancel)?;
             let traced = Instant::now();
             build(store);
             report.trace_seconds += (traced - start).as_secs_f64();
@@ -398,6 +404,7 @@ impl<'a> Setting<'a> {
             let pass = self.photon_pass(group, report.per_pass, time);
             self.prepare::<O, I>(&pass, scratch, &mut report)?;
             let start = Instant::now();
+            let path = PathTracer { scene: self.seen_in(group), ..path };
             let tracer = self.eye(path, scratch, time);
             let passes = group * each..(group * each + each).min(samples);
             tiles.par_iter_mut().try_for_each(|tile| {
@@ -488,6 +495,7 @@ impl TileState {
         let by_passes = shrunk_by_passes(pass, alpha);
         let Tile { x0, y0, x1, y1 } = self.tile;
         let before = self.counters.rays;
+        let seen_at = tracer.path.scene.surfaces.materials.wavelengths();
         let mut pixels = self.radii.iter_mut();
         for (y, x) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (y, x))) {
             if x == x0 && job.control.cancel.load(Relaxed) {
@@ -513,7 +521,7 @@ impl TileState {
             radius.begin_with(gathered.part);
             radius.absorb(gathered.found, alpha);
             self.gathered.include(&gathered);
-            self.buffer.add(x, y, &sample);
+            self.buffer.add_seen(x, y, &sample, seen_at);
         }
         let samples = u64::from(x1 - x0) * u64::from(y1 - y0);
         job.control.samples_done.fetch_add(samples, Relaxed);

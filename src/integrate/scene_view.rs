@@ -4,6 +4,8 @@ use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
 use crate::build::density::Densities;
 use crate::build::light::{LightTable, Lights, ShapeLights};
 use crate::build::nesting::{NestedGeometry, Solids};
+use crate::build::spectra::Spectra;
+use crate::color::spectrum;
 use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
@@ -22,6 +24,7 @@ pub struct SceneTables<'w> {
     requirements: Res<'w, Requirements>,
     solids: Res<'w, Solids>,
     densities: Res<'w, Densities>,
+    spectra: Res<'w, Spectra>,
 }
 
 /// The scene of a frame: arrays and indices, read-only.
@@ -41,9 +44,23 @@ pub struct SceneView<'a> {
     pub solids: &'a Solids,
     /// Solids of uneven density.
     pub densities: &'a Densities,
+    /// The surfaces at each set of wavelengths, in a spectral scene.
+    pub spectra: &'a [Surfaces],
 }
 
 impl<'a> SceneView<'a> {
+    /// The scene as a sample of any pixel sees it: in a spectral scene at the next set of wavelengths.
+    #[inline]
+    #[must_use]
+    pub fn of_sample(self, sample: u32) -> Self {
+        if self.spectra.is_empty() {
+            return self;
+        }
+        let surfaces = &self.spectra[spectrum::set_of(sample)];
+        let lights = Lights { materials: &surfaces.materials, ..self.lights };
+        Self { surfaces, lights, ..self }
+    }
+
     /// What rays meet which know what they are inside of.
     #[inline]
     pub fn nested(&self) -> NestedGeometry<'a> {
@@ -78,6 +95,7 @@ impl SceneTables<'_> {
             requirements: &self.requirements,
             solids: &self.solids,
             densities: &self.densities,
+            spectra: &self.spectra.surfaces,
         }
     }
 }

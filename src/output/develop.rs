@@ -11,9 +11,11 @@ use std::path::Path;
 
 /// Turns linear radiance into 8-bit sRGB codes.
 ///
-/// `exposure` is in stops. Only here is anything clipped.
+/// `exposure` is in stops. Only here is anything clipped. A colour outside of the gamut, as a spectrum may have, has
+/// white added until no channel is negative: hues keep their order.
 pub fn develop(radiance: Rgb, exposure: f32, tonemap: ToneMap) -> [u8; 3] {
-    let exposed = radiance * exposure_factor(exposure);
+    let shown = radiance - radiance.min_element().min(0.0);
+    let exposed = shown * exposure_factor(exposure);
     let to_codes = |linear: Rgb| linear.to_array().map(srgb::encode_u8);
     match tonemap {
         ToneMap::Srgb => to_codes(exposed),
@@ -50,6 +52,7 @@ mod tests {
     fn exposure_and_curve_are_applied_before_the_codes() {
         assert_eq!(develop(Rgb::splat(0.18), 0.0, ToneMap::Srgb), [118; 3]);
         assert_eq!(develop(Rgb::splat(0.045), 2.0, ToneMap::Srgb), [118; 3]);
+        assert_eq!(develop(Rgb::new(-0.25, 0.25, 0.0), 0.0, ToneMap::Srgb), [0, 188, 137]);
         assert_eq!(develop(Rgb::new(5.0, 1.0, 0.0), 0.0, ToneMap::Srgb), [255, 255, 0]);
         assert_eq!(develop(Rgb::splat(0.18), 0.0, ToneMap::Agx), [128; 3]);
         assert_eq!(develop(Rgb::ONE, 0.0, ToneMap::Reinhard), [188; 3]); // 255·encode(0.5) = 187.5

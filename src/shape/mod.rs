@@ -140,6 +140,15 @@ impl Primitive {
         Aabb { min, max }
     }
 
+    /// Whether it divides space into an inside and an outside, whatever its measures.
+    pub fn is_closed(&self) -> bool {
+        match self {
+            Self::Sphere | Self::Cuboid => true,
+            Self::Cylinder { capped } | Self::Cone { capped } => *capped,
+            Self::Rectangle | Self::Disk | Self::Plane | Self::Revolution(_) => false,
+        }
+    }
+
     /// The nearest hit with `0 < t < t_max`.
     #[inline]
     pub fn intersect(&self, ray: &LocalRay, t_max: f64) -> Option<LocalHit> {

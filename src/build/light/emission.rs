@@ -232,7 +232,8 @@ impl Emission<'_> {
             _ => 1.0,
         };
         let ray = Ray { o: p.as_vec3(), d: wi, time: self.time };
-        Some(EmittedPhoton { ray, power: intensity * (falloff / pdf) })
+        let power = self.lights.materials.seen(intensity) * (falloff / pdf);
+        Some(EmittedPhoton { ray, power })
     }
 
     /// From infinitely far away: a direction, then a point of the disk perpendicular to it.
@@ -247,6 +248,7 @@ impl Emission<'_> {
         // Towards the light, and radiance over the density of the direction.
         let (wi, irradiance) = match light.light {
             Light::Directional { irradiance, angle } => {
+                let irradiance = self.lights.materials.seen(irradiance);
                 let axis = -axis_of(&map);
                 match DistantCone::new(angle) {
                     None => (axis, irradiance),

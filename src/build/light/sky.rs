@@ -90,7 +90,7 @@ impl SkyLight {
     ) -> Rgb {
         match self.radiance {
             // The same everywhere: where it comes from is not asked.
-            Value::Constant(radiance) => radiance * self.scale,
+            Value::Constant(radiance) => materials.seen(radiance) * self.scale,
             Value::Texture(_) => self.radiance_local(to_light(render_from_light, wi), materials),
         }
     }

@@ -280,8 +280,10 @@ impl Lights<'_> {
             let axis = -axis_of(&light.motion.at(time));
             // 1 − cos θ from the chord, without cancellation
             let one_minus_cos = 0.5 * (wi - axis).length_squared();
-            (one_minus_cos <= cone.one_minus_cos_max)
-                .then(|| (irradiance / cone.projected_solid_angle, cone.pdf() * probability))
+            (one_minus_cos <= cone.one_minus_cos_max).then(|| {
+                let radiance = self.materials.seen(irradiance) / cone.projected_solid_angle;
+                (radiance, cone.pdf() * probability)
+            })
         })
     }
 
@@ -434,7 +436,7 @@ impl Lights<'_> {
             let to = map.translation - from.p;
             let distance2 = to.length_squared();
             let wi = to.try_normalize()?.as_vec3();
-            let radiance = intensity / distance2 as f32;
+            let radiance = self.materials.seen(intensity) / distance2 as f32;
             let end = ShadowEnd::Point(map.translation);
             Some(LightSample { wi, radiance, pdf: 1.0, delta: true, end })
         };
@@ -449,6 +451,7 @@ impl Lights<'_> {
                 Some(sample)
             }
             Light::Directional { irradiance, angle } => {
+                let irradiance = self.materials.seen(irradiance);
                 let axis = -axis_of(&map);
                 let end = ShadowEnd::Infinity;
                 Some(match DistantCone::new(angle) {

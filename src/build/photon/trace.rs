@@ -261,11 +261,8 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
     ) {
         let EmittedPhoton { ray, power } = photon;
         let PhotonTracer { scene: NestedGeometry { geometry, materials, .. }, .. } = *self;
-        let inside = I::new(&if I::NESTS {
-            self.scene.around(ray.o, ray.time)
-        } else {
-            SolidStack::default()
-        });
+        let inside =
+            I::new(&if I::NESTS { self.scene.around(&ray) } else { SolidStack::default() });
         let mut walk = Walk { ray, power, inside, depth: 0, met: 0, only_specular: true };
         loop {
             counters.rays += 1;

@@ -104,6 +104,7 @@ pub(super) fn assemble(
     relations::check_cycles(&scene, names, report);
     relations::check_shares(&scene, names, report);
     relations::check_normal_maps(&scene, names, report);
+    relations::check_absorption(&scene, names, report);
     scene.content_hash = assets.hash.0.digest128();
     scene.warnings = relations::warnings(&scene, names);
     if report.found.has_errors() {

@@ -231,6 +231,20 @@ pub(super) fn check_normal_maps(scene: &SceneDescription, names: &Names, report:
     }
 }
 
+/// Reports solids whose absorption by wavelength is no spectrum.
+pub(super) fn check_absorption(scene: &SceneDescription, names: &Names, report: &mut Report) {
+    for (name, material) in &scene.materials {
+        let Material::Dielectric { absorption: Some(texture), .. } = material else { continue };
+        let is_spectrum = |texture| matches!(texture, &Texture::Spectrum { .. });
+        if scene.textures.get(texture).is_some_and(|texture| !is_spectrum(texture)) {
+            let message =
+                format!("`absorption` must be a `Spectrum`, but the texture `{texture}` is none");
+            report.at("scene::wrong-type", &names.materials[name].at("absorption"), message).help =
+                Some("say it by colour as `attenuation`, or define a `Spectrum`".to_owned());
+        }
+    }
+}
+
 /// The greatest value of a texture made of patterns; 0 where it is not known before looking at pixels.
 fn greatest(texture: &SceneTexture, scene: &SceneDescription, depth: usize) -> f32 {
     // Cycles are reported elsewhere.
@@ -246,6 +260,9 @@ fn greatest(texture: &SceneTexture, scene: &SceneDescription, depth: usize) -> f
     };
     match texture {
         Texture::Image { .. } | Texture::Grid { .. } | Texture::VertexColor {} => 0.0,
+        Texture::Spectrum { values, scale } => {
+            values.points().iter().map(|point| point.1 * scale).fold(0.0, f32::max)
+        }
         Texture::Checker { a, b, .. }
         | Texture::Stripes { a, b, .. }
         | Texture::Gradient { a, b }

@@ -240,43 +240,13 @@ pub(super) fn read_material(
         Material::Mirror { reflectance } => {
             check.color("reflectance", reflectance, &limits::SHARE);
         }
-        Material::Dielectric {
-            ior,
-            dispersion,
-            roughness,
-            attenuation,
-            scattering,
-            emission,
-            density,
-            priority: _,
-        } => {
+        Material::Dielectric { ior, dispersion, roughness, .. } => {
             let fine = limits::number(check.report, &cursor.at("ior"), *ior, &limits::IOR);
             if let Some(dispersion) = dispersion.as_ref().filter(|_| fine) {
                 check_dispersion(cursor, *ior, dispersion, check.report);
             }
             check.scalar("roughness", roughness);
-            if let Some(attenuation) = attenuation {
-                let cursor = &cursor.at("attenuation");
-                let mut check = Parameters { cursor, names, report: check.report };
-                check.rgb("color", attenuation.color, &limits::TRANSMITTANCE);
-                check.number("distance", attenuation.distance, &limits::LENGTH);
-            }
-            if let Some(scattering) = scattering {
-                let cursor = &cursor.at("scattering");
-                let mut check = Parameters { cursor, names, report: check.report };
-                check.rgb("coefficient", scattering.coefficient, &limits::COEFFICIENT);
-                if let PhaseFunction::HenyeyGreenstein(g) = scattering.phase {
-                    check.number("phase", g, &limits::MEAN_COSINE);
-                }
-            }
-            check.rgb("emission", *emission, &limits::STRENGTH);
-            let place = cursor.at("density");
-            match density {
-                Value::Constant(density) => {
-                    limits::number(check.report, &place, *density, &limits::STRENGTH);
-                }
-                Value::Texture(name) => check.texture(&place, name),
-            }
+            check_inside(&mut check, &material);
         }
         Material::ThinGlass { ior, tint } => {
             check.number("ior", *ior, &limits::IOR);
@@ -332,6 +302,45 @@ pub(super) fn read_material(
         }
     }
     Some(material)
+}
+
+/// Checks what is inside a solid.
+fn check_inside(check: &mut Parameters, material: &Material<String>) {
+    let Material::Dielectric { attenuation, absorption, scattering, emission, density, .. } =
+        material
+    else {
+        return;
+    };
+    let (cursor, names) = (check.cursor, check.names);
+    if let Some(attenuation) = attenuation {
+        let cursor = &cursor.at("attenuation");
+        let mut check = Parameters { cursor, names, report: check.report };
+        check.rgb("color", attenuation.color, &limits::TRANSMITTANCE);
+        check.number("distance", attenuation.distance, &limits::LENGTH);
+    }
+    if let Some(name) = absorption {
+        check.texture(&cursor.at("absorption"), name);
+        if let Some(given) = cursor.field("attenuation").filter(|_| attenuation.is_some()) {
+            let message = "a solid absorbs by `attenuation` or by `absorption`, not both";
+            check.report.at("scene::conflict", &given, message);
+        }
+    }
+    if let Some(scattering) = scattering {
+        let cursor = &cursor.at("scattering");
+        let mut check = Parameters { cursor, names, report: check.report };
+        check.rgb("coefficient", scattering.coefficient, &limits::COEFFICIENT);
+        if let PhaseFunction::HenyeyGreenstein(g) = scattering.phase {
+            check.number("phase", g, &limits::MEAN_COSINE);
+        }
+    }
+    check.rgb("emission", *emission, &limits::STRENGTH);
+    let place = cursor.at("density");
+    match density {
+        Value::Constant(density) => {
+            limits::number(check.report, &place, *density, &limits::STRENGTH);
+        }
+        Value::Texture(name) => check.texture(&place, name),
+    }
 }
 
 fn check_dispersion(cursor: &Cursor, ior: f32, dispersion: &Dispersion, report: &mut Report) {

@@ -70,6 +70,13 @@ pub(super) fn read_texture(
             check.number("size", *size, &limits::LENGTH);
             check.number("sharpness", *sharpness, &limits::POWER);
         }
+        Texture::Spectrum { values, scale } => {
+            for (k, (_, value)) in values.points().iter().enumerate() {
+                let place = cursor.at("values").nth(k);
+                limits::number(check.report, &place, *value, &limits::STRENGTH);
+            }
+            check.number("scale", *scale, &limits::STRENGTH);
+        }
         Texture::VertexColor {} => {}
         _ => check_in_space(&mut check, &texture),
     }

@@ -2,6 +2,7 @@
 
 use super::relief::Relief;
 use super::{Compiled, Interior, MaterialTable, material_cycle};
+use crate::color::spectrum::WavelengthSet;
 use crate::description::{Material, Rgb, Scattering, Value, index_at_d};
 use crate::shade::bsdf::{
     AlbedoTable, ConductorFresnel, ReflectorTable, RoughDielectric, SMOOTH_BELOW_ALPHA, Widths,
@@ -9,7 +10,7 @@ use crate::shade::bsdf::{
 };
 use crate::shade::metals;
 use crate::shade::relative::RelativeTables;
-use crate::shade::texture::Textures;
+use crate::shade::texture::{TexturePoint, Textures};
 use std::collections::HashMap;
 
 /// A material with its constants resolved.
@@ -139,7 +140,11 @@ impl MaterialTable {
             reflectors: Vec::new(),
             curves: Vec::new(),
             relative: RelativeTables::new(materials),
+            spectral: Vec::new(),
+            seen_at: None,
         };
+        let spectral = |index| has_spectrum(index, materials, &table.textures);
+        table.spectral = (0..materials.len() as u32).map(spectral).collect();
         let mut known = KnownTables::default();
         let kinds: Vec<Kind> =
             materials.iter().map(|material| table.compile(material, &mut known)).collect();
@@ -153,7 +158,7 @@ impl MaterialTable {
                 kind: kind.clone(),
                 has_opacity: has_opacity(index as u32, &kinds),
                 needs_lobe: needs_lobe(index as u32, &kinds),
-                interior: interior(index as u32, materials),
+                interior: interior(index as u32, materials, &table.textures),
                 curve: solid_of(index as u32),
                 disperses: disperses(index as u32, materials),
                 relief: relief(&materials[index]),
@@ -216,6 +221,23 @@ pub(in crate::shade) fn glass_width(eta: f32, width: Width) -> Width {
         Width::Texture(_) => strength * SMOOTH_BELOW_ALPHA >= RoughDielectric::SMOOTH_BELOW_WIDTH,
     };
     if resolved { width } else { Width::Smooth }
+}
+
+impl Kind {
+    /// The same with metals seen at the wavelengths of a set; other colours are seen where they are looked up.
+    pub(super) fn seen_at(&self, set: &WavelengthSet) -> Self {
+        let Self::Conductor { fresnel: MetalColor::Same(fresnel, _), width, table } = self else {
+            return self.clone();
+        };
+        let fresnel = match *fresnel {
+            ConductorFresnel::Complex { eta, k } => {
+                ConductorFresnel::Complex { eta: set.between(eta), k: set.between(k) }
+            }
+            ConductorFresnel::Schlick { f0 } => ConductorFresnel::Schlick { f0: set.from_rgb * f0 },
+        };
+        let fresnel = MetalColor::Same(fresnel, fresnel.average());
+        Self::Conductor { fresnel, width: *width, table: *table }
+    }
 }
 
 fn metal_color(
@@ -283,12 +305,13 @@ fn solid(index: u32, materials: &[Material<u32>]) -> Option<u32> {
     }
 }
 
-fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
+fn interior(index: u32, materials: &[Material<u32>], textures: &Textures) -> Option<Interior> {
     let solid = solid(index, materials)?;
     let Material::Dielectric {
         ior,
         dispersion,
         attenuation,
+        absorption,
         scattering,
         emission,
         density,
@@ -303,7 +326,14 @@ fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
         Value::Constant(factor) => (factor, None),
         Value::Texture(texture) => (1.0, Some(texture)),
     };
+    let absorption = absorption.filter(|_| factor > 0.0).map(|spectrum| (spectrum, factor));
+    let by_spectrum = |(spectrum, factor): (u32, f32)| {
+        // Where wavelengths are not told apart its colour counts; nothing absorbs less than nothing.
+        let color = textures.color(spectrum, &TexturePoint::at(glam::Vec2::ZERO));
+        (color * factor).max(Rgb::ZERO)
+    };
     let sigma_a = attenuation.filter(|_| factor > 0.0).map(|a| a.sigma_a() * factor);
+    let sigma_a = absorption.map(by_spectrum).or(sigma_a);
     let scattering = scattering.filter(|_| factor > 0.0).map(|scattering| Scattering {
         coefficient: scattering.coefficient * factor,
         ..scattering
@@ -313,11 +343,28 @@ fn interior(index: u32, materials: &[Material<u32>]) -> Option<Interior> {
     Some(Interior {
         ior: index_at_d(*ior, dispersion.as_ref()),
         sigma_a,
+        absorption,
         scattering,
         emission,
         density: texture.filter(|_| !empty),
         priority: *priority,
     })
+}
+
+/// Whether a material, or one that it is made of, looks at a spectrum.
+fn has_spectrum(index: u32, materials: &[Material<u32>], textures: &Textures) -> bool {
+    let mut found = false;
+    let mut parts = Vec::new();
+    let mut texture = |texture: u32| {
+        found |= textures.is_spectrum(texture);
+        Ok::<_, std::convert::Infallible>(())
+    };
+    let mut material = |material: u32| {
+        parts.push(material);
+        Ok(())
+    };
+    let Ok(_) = materials[index as usize].clone().map_refs(&mut texture, &mut material);
+    found || parts.into_iter().any(|part| has_spectrum(part, materials, textures))
 }
 
 fn disperses(index: u32, materials: &[Material<u32>]) -> bool {

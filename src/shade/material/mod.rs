@@ -18,6 +18,7 @@ use super::bsdf::{
 use super::medium::Medium;
 use super::relative::RelativeTables;
 use super::texture::{TexturePoint, Textures};
+use crate::color::spectrum::WavelengthSet;
 use crate::description::{IndexCurve, Material, Rgb, Scattering, Value};
 use crate::extract::NOTHING;
 use compile::{Kind, MetalColor};
@@ -39,6 +40,10 @@ pub struct MaterialTable {
     curves: Vec<IndexCurve>,
     /// Rough interfaces to other media than air.
     relative: RelativeTables,
+    /// By material, whether it, or one that it is made of, looks at a spectrum.
+    spectral: Vec<bool>,
+    /// The wavelengths that stand in for red, green and blue, in a spectral scene.
+    seen_at: Option<&'static WavelengthSet>,
 }
 
 /// What is inside a solid dielectric.
@@ -48,6 +53,8 @@ pub struct Interior {
     pub ior: f32,
     /// Absorption coefficient per metre; `None` is perfectly clear.
     pub sigma_a: Option<Rgb>,
+    /// The spectrum by which it absorbs, and a factor; `sigma_a` is its colour.
+    pub absorption: Option<(u32, f32)>,
     /// What is scattered; `None` where light goes straight on.
     pub scattering: Option<Scattering>,
     /// What the inside emits per metre, W·m⁻³·sr⁻¹.
@@ -56,6 +63,26 @@ pub struct Interior {
     pub density: Option<u32>,
     /// Where solids overlap, the one of the highest priority is there.
     pub priority: i32,
+}
+
+impl Interior {
+    /// The same seen at wavelengths.
+    fn seen_at(self, seen: impl Fn(Rgb) -> Rgb, textures: &Textures) -> Self {
+        let by_spectrum = |(spectrum, factor): (u32, f32)| {
+            textures.color(spectrum, &TexturePoint::at(glam::Vec2::ZERO)) * factor
+        };
+        let absorbed = self.absorption.map(by_spectrum);
+        let scattering = self.scattering.map(|scattering| Scattering {
+            coefficient: seen(scattering.coefficient),
+            ..scattering
+        });
+        Self {
+            sigma_a: absorbed.or(self.sigma_a.map(&seen)),
+            scattering,
+            emission: seen(self.emission),
+            ..self
+        }
+    }
 }
 
 /// A [`Material`] with all that does not depend on the point resolved.
@@ -298,6 +325,11 @@ impl MaterialTable {
         !disperses && outside.is_none_or(|outside| !self.disperses(outside)) && *eta == around
     }
 
+    /// Whether a material, or one that it is made of, has a spectrum.
+    pub fn has_spectrum(&self, material: u32) -> bool {
+        self.spectral[material as usize]
+    }
+
     /// Whether the wavelength matters at a surface of this material, or inside it.
     #[inline]
     pub fn disperses(&self, material: u32) -> bool {
@@ -434,11 +466,40 @@ impl MaterialTable {
         self.interior(material).is_some()
     }
 
+    /// A colour, or in a spectral scene its values at the wavelengths.
+    #[inline]
+    pub fn seen(&self, color: Rgb) -> Rgb {
+        match self.seen_at {
+            None => color,
+            Some(set) => set.from_rgb * color,
+        }
+    }
+
+    /// The wavelengths at which the materials are seen, in a spectral scene.
+    #[inline]
+    pub fn wavelengths(&self) -> Option<&'static WavelengthSet> {
+        self.seen_at
+    }
+
+    /// The same materials seen at the wavelengths of a set, which stand in for red, green and blue.
+    #[must_use]
+    pub fn seen_at(&self, set: &'static WavelengthSet) -> Self {
+        let textures = self.textures.seen_at(set);
+        let seen = |color: Rgb| set.from_rgb * color;
+        let materials = self.materials.iter().map(|material| Compiled {
+            kind: material.kind.seen_at(set),
+            interior: material.interior.map(|interior| interior.seen_at(seen, &textures)),
+            ..material.clone()
+        });
+        let materials = materials.collect();
+        Self { materials, textures, seen_at: Some(set), ..self.clone() }
+    }
+
     /// A colour which is constant or textured, as it is: not limited to any range.
     #[inline]
     pub fn color(&self, value: &Value<Rgb, u32>, at: &TexturePoint) -> Rgb {
         match *value {
-            Value::Constant(color) => color,
+            Value::Constant(color) => self.seen(color),
             Value::Texture(texture) => self.textures.color(texture, at),
         }
     }

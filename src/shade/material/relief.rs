@@ -67,7 +67,7 @@ impl MaterialTable {
                 ns - near.axes[0] * slope(0) - near.axes[1] * slope(1)
             }
             Relief::Normals { map, strength, green } => {
-                let coded = self.textures.color(map, at) * 2.0 - 1.0;
+                let coded = self.textures.vector(map, at) * 2.0 - 1.0;
                 let up = if green == Green::Up { coded.y } else { -coded.y };
                 let across = Vec2::new(coded.x, up) * strength;
                 let Some([tangent, bitangent]) = tangents() else { return ns };

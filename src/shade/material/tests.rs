@@ -21,6 +21,7 @@ fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Materi
         dispersion: None,
         roughness,
         attenuation,
+        absorption: None,
         scattering: None,
         emission: Rgb::ZERO,
         density: Value::Constant(1.0),
@@ -121,6 +122,7 @@ fn solids_know_their_interior() {
         Some(Interior {
             ior: 1.5,
             sigma_a: None,
+            absorption: None,
             scattering: None,
             emission: Rgb::ZERO,
             density: None,
@@ -221,6 +223,7 @@ fn a_prism_turns_each_line_by_its_angle() {
         dispersion,
         roughness: 0.0.into(),
         attenuation: None,
+        absorption: None,
         scattering: None,
         emission: Rgb::ZERO,
         density: Value::Constant(1.0),

@@ -18,6 +18,7 @@ pub use pyramid::Pyramid;
 pub use range::{Ranges, Region};
 
 use crate::color::luminance;
+use crate::color::spectrum::{WavelengthSet, color_of};
 use crate::description::{Falloff, GridData, ImageData, Rgb, Texture, TextureFiltering, Value};
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
 use pattern::Wall;
@@ -98,6 +99,8 @@ pub struct Textures {
     filtering: TextureFiltering,
     /// Opening and closing of the shutter, seconds.
     shutter: (f64, f64),
+    /// The wavelengths that stand in for red, green and blue, in a spectral scene.
+    seen_at: Option<&'static WavelengthSet>,
 }
 
 impl Textures {
@@ -133,7 +136,7 @@ impl Textures {
                 }
             })
             .collect();
-        Self { list, filtering, shutter: (0.0, 0.0) }
+        Self { list, filtering, shutter: (0.0, 0.0), seen_at: None }
     }
 
     /// The same at the time of a frame: when its shutter opens and closes, in seconds.
@@ -198,10 +201,31 @@ impl Textures {
         texture.refs().fold(own, |sum, (_, part)| sum.and(self.needs(*part)))
     }
 
-    /// The colour of a texture at a point.
+    /// The colour of a texture at a point; seen at wavelengths, its values there.
     #[inline]
     pub fn color(&self, index: u32, at: &TexturePoint) -> Rgb {
+        let Some(set) = self.seen_at else { return self.vector(index, at) };
+        match &self.list[index as usize] {
+            Texture::Spectrum { values, scale } => set.of_spectrum(values) * *scale,
+            _ => set.from_rgb * self.vector(index, at),
+        }
+    }
+
+    /// The three numbers which a texture holds at a point, whatever they mean.
+    #[inline]
+    pub fn vector(&self, index: u32, at: &TexturePoint) -> Vec3 {
         self.sample(index, at)
+    }
+
+    /// Whether a texture is a spectrum.
+    pub fn is_spectrum(&self, index: u32) -> bool {
+        matches!(self.list[index as usize], Texture::Spectrum { .. })
+    }
+
+    /// The same textures seen at the wavelengths of a set.
+    #[must_use]
+    pub fn seen_at(&self, set: &'static WavelengthSet) -> Self {
+        Self { seen_at: Some(set), ..self.clone() }
     }
 
     /// The number which a texture holds at a point: the chosen channel of an image, the luminance of a
@@ -395,6 +419,7 @@ impl Textures {
             Texture::Triplanar { of, size, sharpness } => {
                 self.triplanar(*of, *size, *sharpness, at)
             }
+            Texture::Spectrum { values, scale } => T::of_color(color_of(values) * *scale),
             Texture::VertexColor {} => T::of_color(at.color),
         }
     }

@@ -6,6 +6,7 @@
 use super::solid::{self, Octaves};
 use super::{TexturePoint, Textures, grid, image, pattern, remap};
 use crate::color::luminance;
+use crate::color::spectrum::color_of;
 use crate::description::{CellFeature, Falloff, Rgb, Texture, Value};
 use glam::{DMat2, DVec2, DVec3};
 use std::collections::HashMap;
@@ -206,6 +207,7 @@ impl<'a> Ranges<'a> {
                 let uv = region.p.map(|p| p.truncate() / f64::from(*size));
                 self.of(*of, &region.with_uv(uv))
             }
+            Texture::Spectrum { values, scale } => [luminance(color_of(values) * *scale); 2],
             Texture::VertexColor {} => [1.0; 2],
         }
     }
