@@ -87,6 +87,52 @@ fn light_is_scattered_once_as_the_airlight_integral_says() {
     }
 }
 
+/// A pencil of sunlight through a square hole in fog, seen from the side and scattered once: what arrives on a film across it is
+/// `∫E·exp(−σ(x + 3))·σ_s·p(90°)·A dx` less what the 3 m to the border take, in closed form. By light rays, and by photons, whose
+/// blur moves light about but loses none.
+#[test]
+fn a_pencil_of_light_is_as_bright_as_the_closed_form_says() {
+    let (sigma_s, sigma_a, g) = (0.3_f64, 0.1_f64, 0.4_f64);
+    let sigma = sigma_s + sigma_a;
+    let phase = (1.0 - g * g) / (4.0 * std::f64::consts::PI * (1.0 + g * g).powf(1.5));
+    // Through a hole of this side, on a film of that.
+    let expected = |hole: f64, film: f64| {
+        let along = ((0.5 * film - 3.0) * sigma).exp() - ((-0.5 * film - 3.0) * sigma).exp();
+        let deep = 2.0 * (0.5 * hole * sigma).sinh() / sigma * (-3.0 * sigma).exp();
+        100.0 * along / sigma * sigma_s * phase * hole * deep / (film * film)
+    };
+    let text = |hole: f64, film: f64| {
+        let plate = |name: &str, (y, z): (f64, f64), size: (f64, f64)| {
+            format!(
+                r#""{name}": (transform: (translation: (-1, {y}, {z}), rotation: (0, 90, 0)), shape: Rectangle(size: {size:?}), material: "black"),"#
+            )
+        };
+        let beside = 0.5 * hole + 1.5;
+        in_fog(
+            "max_depth: 1",
+            &fog(sigma_s, sigma_a, g),
+            &format!(
+                r#""camera": (transform: (translation: (0, 0, 9), look_at: (0, 0, 0)), camera: (orthographic: Some({film}))),
+                "air": (shape: Box(size: (6, 6, 6)), material: "fog"),
+                {}{}{}{}
+                "sun": (transform: (translation: (-1, 0, 0), look_at: (0, 0, 0)), light: Directional(irradiance: (100, 100, 100)))"#,
+                plate("above", (beside, 0.0), (6.0, 3.0)),
+                plate("below", (-beside, 0.0), (6.0, 3.0)),
+                plate("before", (0.0, beside), (3.0, hole)),
+                plate("behind", (0.0, -beside), (3.0, hole))
+            ),
+        )
+    };
+    let paths = render(&text(0.1, 0.3), (32, 32), 2048).mean();
+    paths.assert_agrees("light rays", expected(0.1, 0.3), 1e-2);
+    let photons = "integrator: Sppm, photons: (direct: Photons, per_pass: Some(262144))";
+    let text = text(0.5, 1.0).replace("integrator: Path", photons);
+    let (mean, error) = mean_of_seeds(&text, (16, 16), 16);
+    let expected = expected(0.5, 1.0);
+    assert!(error < 0.01 * expected, "± {error}");
+    assert!((mean - expected).abs() < 4.0 * error, "{mean} ± {error}, not {expected}");
+}
+
 /// Fog in two boxes which touch is fog in one: what flies through both draws anew in the second. Almost all is absorbed.
 #[test]
 fn fog_behind_fog_is_thicker() {
