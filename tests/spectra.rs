@@ -4,6 +4,7 @@ mod common;
 
 use common::{Estimate, Picture, render, render_description, scene};
 use glam::Vec3;
+use kinora::color::Blackbody;
 use kinora::color::spectrum::color_of;
 use kinora::description::SpectrumData;
 use kinora::frame::Simulation;
@@ -22,7 +23,7 @@ fn assert_color(picture: &Picture, what: &str, expected: Vec3, precision: f64) {
 /// A wall seen square on in light from the front.
 fn wall(settings: &str, textures: &str, wall: &str, light: &str) -> String {
     format!(
-        r#"(render: (filter: Box(), integrator: Path, max_depth: 1, {settings}),
+        r#"(render: (filter: Box(), integrator: Path, max_depth: 2, {settings}),
         textures: {{ {textures} }},
         materials: {{ "wall": {wall} }},
         entities: {{
@@ -105,6 +106,20 @@ fn lamps_and_paints_are_multiplied_by_wavelength() {
     assert!((apart - expected).abs().max_element() > 0.1 * expected.max_element());
     // The line of the lamp is 9 nm wide at half its height, bins are up to 2 nm there.
     assert_color(&render(&text, (16, 16), 1024), "sodium", expected, 0.01);
+}
+
+/// A blackbody's spectrum is that of its temperature: seen in a mirror it has the colour of that, within what a bin is coarse.
+#[test]
+fn blackbodies_shine_by_wavelength() {
+    let text = wall(
+        "spectral: true",
+        "",
+        "Mirror()",
+        r#""lamp": (transform: (translation: (0, 0, 3), rotation: (0, 180, 0)), shape: Rectangle(size: (9, 9)), emission: Temperature(kelvin: 3000, radiance: 5))"#,
+    )
+    .replace("translation: (0, 0, 2)", "translation: (0, 0, 2.5)");
+    let expected = 5.0 * color_of(&Blackbody::new(3000.0).spectrum);
+    assert_color(&render(&text, (4, 4), 64), "3000 K", expected, 2e-3);
 }
 
 /// Beer and Lambert by wavelength, closed form in f64: light that is absorbed twice is absorbed by the sum, which its colours

@@ -1,11 +1,16 @@
 //! The colour of what glows.
 
 use super::luminance;
+use super::spectrum::{WavelengthSet, color_of, sets};
 use super::wavelength::{matching, rec_709};
+use crate::description::{Rgb, SpectrumData};
 use glam::{DVec3, Vec3};
 
 /// Second radiation constant `hc/k`, nm·K (CODATA 2018).
 const C2: f64 = 1.438_776_877e7;
+
+/// The temperature whose colour is nearest to the white of Rec. 709, kelvin.
+const WHITE: f64 = 6504.0;
 
 /// Relative XYZ of a blackbody: Planck's law, summed over 360 to 830 nm. Y is 1.
 fn planckian(kelvin: f64) -> DVec3 {
@@ -23,6 +28,42 @@ pub fn blackbody(kelvin: f64) -> Vec3 {
     let color = rec_709(planckian(kelvin));
     let inside = (color - color.min_element().min(0.0)).as_vec3();
     inside / luminance(inside)
+}
+
+/// What a blackbody shines.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blackbody {
+    /// Its temperature.
+    pub kelvin: f32,
+    /// Its [colour](blackbody), of luminance 1.
+    pub color: Rgb,
+    /// By wavelength, relative to that of 6504 K, whose colour is the white of red, green and blue; of luminance 1.
+    pub spectrum: SpectrumData,
+    /// The values of the spectrum at each set of wavelengths.
+    seen: Vec<Vec3>,
+}
+
+impl Blackbody {
+    /// A blackbody of a temperature.
+    pub fn new(kelvin: f32) -> Self {
+        let radiance = |nm: f64, kelvin: f64| 1.0 / (C2 / (nm * kelvin)).exp_m1();
+        let ratio = |nm: f64| radiance(nm, f64::from(kelvin)) / radiance(nm, WHITE);
+        let middle = ratio(560.0);
+        let points = |scale: f64| {
+            let nm = (0..=35).map(|k| 380.0 + 10.0 * f64::from(k));
+            SpectrumData::new(nm.map(|nm| (nm as f32, (ratio(nm) * scale) as f32)).collect())
+        };
+        let luminance = f64::from(luminance(color_of(&points(1.0 / middle))));
+        let spectrum = points(1.0 / (middle * luminance));
+        let seen = sets().iter().map(|set| set.of_spectrum(&spectrum)).collect();
+        Self { kelvin, color: blackbody(f64::from(kelvin)), spectrum, seen }
+    }
+
+    /// What it shines at the wavelengths of a set.
+    #[inline]
+    pub fn at(&self, set: &WavelengthSet) -> Vec3 {
+        self.seen[set.index as usize]
+    }
 }
 
 #[cfg(test)]
@@ -46,6 +87,25 @@ mod tests {
             let off = (found_x - x).hypot(found_y - y);
             assert!(off < 4e-3, "{kelvin} K: {found_x} {found_y}");
         }
+    }
+
+    /// By wavelength a blackbody has nearly the colour that it has in red, green and blue, relative to that of 6504 K: not quite,
+    /// since a ratio of colours is not the colour of a ratio, and what lies outside of the gamut is not moved. White is flat.
+    #[test]
+    fn spectra_of_blackbodies_have_their_colours() {
+        for (kelvin, precision) in
+            [(2700.0, 0.012), (4000.0, 0.012), (6504.0, 1e-5), (9000.0, 0.012)]
+        {
+            let body = Blackbody::new(kelvin);
+            let color = color_of(&body.spectrum);
+            assert!((luminance(color) - 1.0).abs() < 1e-5, "{kelvin} K: {color}");
+            let expected = body.color / blackbody(WHITE);
+            let expected = expected / luminance(expected);
+            let off = (color - expected).abs().max_element() / expected.max_element();
+            assert!(off < precision, "{kelvin} K: {color}, {expected}");
+        }
+        let white = Blackbody::new(6504.0).spectrum;
+        assert!(white.points().iter().all(|(_, value)| (value - 1.0).abs() < 1e-5));
     }
 
     /// Hotter is bluer; all of one luminance, none negative, from embers to stars.

@@ -9,7 +9,7 @@ pub mod srgb;
 pub mod tone;
 pub mod wavelength;
 
-pub use blackbody::blackbody;
+pub use blackbody::{Blackbody, blackbody};
 
 use glam::Vec3;
 

@@ -76,6 +76,8 @@ pub struct Bin {
 /// Three parts of the spectrum, which a path follows together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WavelengthSet {
+    /// Its place among the [`sets`].
+    pub index: u32,
     /// The parts, ascending.
     pub bins: [Bin; 3],
     /// From a colour to values at the three.
@@ -85,9 +87,17 @@ pub struct WavelengthSet {
 }
 
 impl WavelengthSet {
-    /// The mean of a spectrum over each of the three.
+    /// The mean of a spectrum over each of the three, by the weight for the eye.
     pub fn of_spectrum(&self, spectrum: &SpectrumData) -> Vec3 {
-        Vec3::from_array(self.bins.map(|bin| spectrum.mean(bin.nm.0, bin.nm.1)))
+        Vec3::from_array(self.bins.map(|bin| {
+            let (mut sum, mut total) = (0.0, 0.0);
+            each_step(bin.nm, |color, low, high| {
+                let weight = weight(&color) * f64::from(high - low);
+                sum += weight * f64::from(spectrum.mean(low, high));
+                total += weight;
+            });
+            (sum / total) as f32
+        }))
     }
 
     /// Draws one of the three, and a wavelength of it, by a number in `[0, 1)`.
@@ -143,12 +153,16 @@ pub fn color_of(spectrum: &SpectrumData) -> Rgb {
     seen.sum::<DVec3>().as_vec3()
 }
 
+/// How much a colour weighs for the eye: the magnitudes of its channels.
+fn weight(color: &DVec3) -> f64 {
+    color.abs().element_sum()
+}
+
 /// All sets.
 pub fn sets() -> &'static [WavelengthSet; SETS as usize] {
     static ALL: OnceLock<[WavelengthSet; SETS as usize]> = OnceLock::new();
     ALL.get_or_init(|| {
-        // Bins weigh the same for the eye: by the magnitudes of the three channels.
-        let weight = |color: &DVec3| color.abs().element_sum();
+        // Bins weigh the same.
         let total: f64 = matching().iter().map(weight).sum();
         let mut edges = vec![VISIBLE_NM.0];
         let mut before = 0.0;
@@ -164,34 +178,43 @@ pub fn sets() -> &'static [WavelengthSet; SETS as usize] {
         std::array::from_fn(|set| {
             let bins = [0, 1, 2].map(|third| {
                 let bin = set + third * SETS as usize;
-                (edges[bin], edges[bin + 1])
+                Bin { nm: (edges[bin] as f32, edges[bin + 1] as f32) }
             });
-            let seen = bins.map(|bin| integral(bin, |color, _| color));
-            let weights = bins.map(|bin| integral(bin, |color, _| DVec3::splat(weight(&color))));
-            let raised = bins.map(|bin| integral(bin, |color, nm| uplift(nm) * weight(&color)));
-            let rows = [0, 1, 2].map(|k| (raised[k] / weights[k]).as_vec3());
+            let (mut seen, mut rows) = ([Vec3::ZERO; 3], [Vec3::ZERO; 3]);
+            for (k, bin) in bins.iter().enumerate() {
+                let (mut color, mut raised, mut total) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+                each_step(bin.nm, |step, low, high| {
+                    let (width, nm) = (f64::from(high - low), 0.5 * f64::from(low + high));
+                    color += step * width;
+                    raised += uplift(nm) * (weight(&step) * width);
+                    total += weight(&step) * width;
+                });
+                seen[k] = (color * f64::from(SETS)).as_vec3();
+                rows[k] = (raised / total).as_vec3();
+            }
             WavelengthSet {
-                bins: bins.map(|(from, to)| Bin { nm: (from as f32, to as f32) }),
-                from_rgb: Mat3::from_cols_array_2d(&rows.map(|row| row.to_array())).transpose(),
-                to_rgb: Mat3::from_cols_array_2d(
-                    &seen.map(|color| (color * f64::from(SETS)).as_vec3().to_array()),
-                ),
+                index: set as u32,
+                bins,
+                from_rgb: Mat3::from_cols(rows[0], rows[1], rows[2]).transpose(),
+                to_rgb: Mat3::from_cols(seen[0], seen[1], seen[2]),
             }
         })
     })
 }
 
-/// An integral over a part of the spectrum of what depends on the colour and the wavelength, nm.
-fn integral((from, to): (f64, f64), value: impl Fn(DVec3, f64) -> DVec3) -> DVec3 {
-    let mut sum = DVec3::ZERO;
-    for (k, color) in matching().iter().enumerate() {
-        let low = VISIBLE_NM.0 + k as f64;
+/// Visits the steps of 1 nm that lie in a part of the spectrum, those at its ends cut: colour per nm, and ends in nm.
+fn each_step((from, to): (f32, f32), mut visit: impl FnMut(DVec3, f32, f32)) {
+    let first = (f64::from(from) - VISIBLE_NM.0) as usize;
+    for (k, color) in matching().iter().enumerate().skip(first) {
+        let low = (VISIBLE_NM.0 + k as f64) as f32;
+        if low >= to {
+            break;
+        }
         let (a, b) = (low.max(from), (low + 1.0).min(to));
         if b > a {
-            sum += value(*color, 0.5 * (a + b)) * (b - a);
+            visit(*color, a, b);
         }
     }
-    sum
 }
 
 /// The set of a sample.

@@ -19,6 +19,13 @@ pub enum EmissionStrength<R> {
     Radiance(Value<Rgb, R>),
     /// Flux of the whole shape in watts per channel, spread evenly over its area.
     Power(Rgb),
+    /// Radiance of a blackbody, as white as that of 6504 K.
+    Temperature {
+        /// Kelvin.
+        kelvin: f32,
+        /// Luminance in units of radiance, W·m⁻²·sr⁻¹.
+        radiance: f32,
+    },
 }
 
 /// A light without a shape. It shines along its local −z and stands at its local origin.
@@ -76,6 +83,9 @@ impl<R> Emission<R> {
         let strength = match self.strength {
             EmissionStrength::Radiance(value) => EmissionStrength::Radiance(value.map_ref(f)?),
             EmissionStrength::Power(watts) => EmissionStrength::Power(watts),
+            EmissionStrength::Temperature { kelvin, radiance } => {
+                EmissionStrength::Temperature { kelvin, radiance }
+            }
         };
         Ok(Emission { strength, two_sided: self.two_sided })
     }

@@ -84,6 +84,7 @@ pub(super) fn caustic_noise(
             let strength = match &emission.strength {
                 EmissionStrength::Radiance(value) => means.of(value, &surfaces.materials),
                 EmissionStrength::Power(power) => f64::from(luminance(*power)) / (PI * area),
+                EmissionStrength::Temperature { radiance, .. } => f64::from(*radiance),
             };
             if area.is_finite() && area > 0.0 {
                 lamps.add(area, strength * f64::from(emission.factor));

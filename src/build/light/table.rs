@@ -4,7 +4,7 @@ use super::SkyLight;
 use super::bounds::{Cone, LightBounds};
 use super::choice::LightChoice;
 use crate::build::bvh::{MeshTree, MeshTrees};
-use crate::color::luminance;
+use crate::color::{Blackbody, luminance};
 use crate::description::{EmissionStrength, Light, Rgb, Value};
 use crate::extract::{
     Emissions, Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights,
@@ -38,6 +38,8 @@ pub enum Emitter {
 pub struct Emitted {
     /// Radiance before the factor.
     pub radiance: Value<Rgb, u32>,
+    /// The blackbody whose radiance that is, if it is one: its place among those of the table, and its luminance.
+    pub blackbody: Option<(u32, f32)>,
     /// Multiplies the radiance.
     pub factor: f32,
     /// Whether the back emits as well.
@@ -48,6 +50,8 @@ pub struct Emitted {
 #[derive(Resource, Clone, Debug, Default)]
 pub struct LightTable {
     pub(super) emitters: Vec<Emitter>,
+    /// The blackbodies that shine, each temperature once.
+    pub(super) blackbodies: Vec<Blackbody>,
     /// How one of them is chosen.
     pub(super) choice: LightChoice,
     /// Flux of each emitter which has a place, luminance, W.
@@ -167,6 +171,32 @@ impl Builder<'_> {
         index
     }
 
+    /// The emission of a surface of this area: a total power is spread evenly over it, `L = Φ/(π·A)` for
+    /// each side.
+    fn emitted(&mut self, emission: &SurfaceEmission, area: f64) -> Emitted {
+        let two_sided = emission.two_sided;
+        let mut blackbody = None;
+        let (radiance, factor) = match emission.strength {
+            EmissionStrength::Radiance(radiance) => (radiance, 1.0),
+            EmissionStrength::Power(watts) => {
+                let sides = if two_sided { 2.0 } else { 1.0 };
+                (Value::Constant(watts), 1.0 / (PI * area * sides))
+            }
+            EmissionStrength::Temperature { kelvin, radiance } => {
+                let known = &mut self.table.blackbodies;
+                let place = known.iter().position(|body| body.kelvin == kelvin);
+                let place = place.unwrap_or_else(|| {
+                    known.push(Blackbody::new(kelvin));
+                    known.len() - 1
+                });
+                blackbody = Some((place as u32, radiance));
+                (Value::Constant(known[place].color * radiance), 1.0)
+            }
+        };
+        let factor = emission.factor * factor as f32;
+        Emitted { radiance, blackbody, factor, two_sided }
+    }
+
     /// The mean of a colour over a surface.
     fn mean_color(&mut self, value: &Value<Rgb, u32>) -> Rgb {
         match value {
@@ -205,7 +235,7 @@ impl Builder<'_> {
             (None, Geometry::Primitive(primitive)) => primitive.world_area(&map),
             (triangles, _) => triangles.iter().flatten().map(|triangle| triangle.area).sum(),
         };
-        let emitted = emitted(emission, area);
+        let emitted = self.emitted(emission, area);
         let mean =
             f64::from(luminance(self.mean_color(&emitted.radiance))) * f64::from(emitted.factor);
         let two_sided = emitted.two_sided;
@@ -324,18 +354,4 @@ fn facing(instance: &Instance, map: &DAffine3) -> Cone {
         }
         _ => Cone::everywhere(),
     }
-}
-
-/// The emission of a surface of this area: a total power is spread evenly over it, `L = Φ/(π·A)` for
-/// each side.
-fn emitted(emission: &SurfaceEmission, area: f64) -> Emitted {
-    let two_sided = emission.two_sided;
-    let (radiance, factor) = match emission.strength {
-        EmissionStrength::Radiance(radiance) => (radiance, 1.0),
-        EmissionStrength::Power(watts) => {
-            let sides = if two_sided { 2.0 } else { 1.0 };
-            (Value::Constant(watts), 1.0 / (PI * area * sides))
-        }
-    };
-    Emitted { radiance, factor: emission.factor * factor as f32, two_sided }
 }

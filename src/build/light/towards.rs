@@ -288,7 +288,13 @@ impl Lights<'_> {
     }
 
     pub(super) fn radiance_of(&self, emitted: &Emitted, at: &TexturePoint) -> Rgb {
-        self.materials.color(&emitted.radiance, at) * emitted.factor
+        let seen = match (emitted.blackbody, self.materials.wavelengths()) {
+            (Some((body, luminance)), Some(set)) => {
+                self.table.blackbodies[body as usize].at(set) * luminance
+            }
+            _ => self.materials.color(&emitted.radiance, at),
+        };
+        seen * emitted.factor
     }
 
     pub(super) fn triangle(

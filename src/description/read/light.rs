@@ -5,7 +5,6 @@ use super::decode::{Report, decode};
 use super::limits;
 use super::source::Cursor;
 use super::surface::Parameters;
-use crate::color::blackbody;
 use crate::description::{Emission, EmissionStrength, Light, Rgb, Value};
 use serde::Deserialize;
 
@@ -17,7 +16,7 @@ enum EmissionFile {
     Power(Rgb),
     /// The colour of a blackbody, and its luminance in units of radiance.
     Temperature {
-        kelvin: f64,
+        kelvin: f32,
         radiance: f32,
     },
 }
@@ -33,10 +32,9 @@ pub(super) fn read_emission(
         EmissionFile::Radiance(radiance) => EmissionStrength::Radiance(radiance),
         EmissionFile::Power(power) => EmissionStrength::Power(power),
         EmissionFile::Temperature { kelvin, radiance } => {
-            let fine = limits::number(report, &cursor.at("kelvin"), kelvin, &limits::TEMPERATURE)
-                & limits::number(report, &cursor.at("radiance"), radiance, &limits::STRENGTH);
-            let color = if fine { blackbody(kelvin) * radiance } else { Rgb::ZERO };
-            EmissionStrength::Radiance(color.into())
+            limits::number(report, &cursor.at("kelvin"), kelvin, &limits::TEMPERATURE);
+            limits::number(report, &cursor.at("radiance"), radiance, &limits::STRENGTH);
+            EmissionStrength::Temperature { kelvin, radiance }
         }
     };
     match &strength {
@@ -49,6 +47,7 @@ pub(super) fn read_emission(
         EmissionStrength::Radiance(Value::Texture(name)) => {
             Parameters { cursor, names, report }.texture(&place, name);
         }
+        EmissionStrength::Temperature { .. } => {}
     }
     Some(Emission { strength, two_sided: false })
 }

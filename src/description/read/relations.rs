@@ -314,7 +314,7 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
         }
         let emitted = entity.emission.as_ref().and_then(|emission| match &emission.strength {
             EmissionStrength::Radiance(value) => value.texture(),
-            EmissionStrength::Power(_) => None,
+            EmissionStrength::Power(_) | EmissionStrength::Temperature { .. } => None,
         });
         let shining = entity.light.as_ref().and_then(|light| match light {
             Light::Sky { radiance, .. } => radiance.texture(),

@@ -99,8 +99,16 @@ pub struct Textures {
     filtering: TextureFiltering,
     /// Opening and closing of the shutter, seconds.
     shutter: (f64, f64),
-    /// The wavelengths that stand in for red, green and blue, in a spectral scene.
-    seen_at: Option<&'static WavelengthSet>,
+    /// What stands in for red, green and blue, in a spectral scene.
+    seen: Option<Seen>,
+}
+
+/// Textures at the wavelengths of a set.
+#[derive(Clone, Debug)]
+struct Seen {
+    at: &'static WavelengthSet,
+    /// By texture, the values of what is a spectrum.
+    spectra: Vec<Option<Vec3>>,
 }
 
 impl Textures {
@@ -136,7 +144,7 @@ impl Textures {
                 }
             })
             .collect();
-        Self { list, filtering, shutter: (0.0, 0.0), seen_at: None }
+        Self { list, filtering, shutter: (0.0, 0.0), seen: None }
     }
 
     /// The same at the time of a frame: when its shutter opens and closes, in seconds.
@@ -204,10 +212,10 @@ impl Textures {
     /// The colour of a texture at a point; seen at wavelengths, its values there.
     #[inline]
     pub fn color(&self, index: u32, at: &TexturePoint) -> Rgb {
-        let Some(set) = self.seen_at else { return self.vector(index, at) };
-        match &self.list[index as usize] {
-            Texture::Spectrum { values, scale } => set.of_spectrum(values) * *scale,
-            _ => set.from_rgb * self.vector(index, at),
+        let Some(seen) = &self.seen else { return self.vector(index, at) };
+        match seen.spectra[index as usize] {
+            Some(values) => values,
+            None => seen.at.from_rgb * self.vector(index, at),
         }
     }
 
@@ -225,7 +233,12 @@ impl Textures {
     /// The same textures seen at the wavelengths of a set.
     #[must_use]
     pub fn seen_at(&self, set: &'static WavelengthSet) -> Self {
-        Self { seen_at: Some(set), ..self.clone() }
+        let values = |texture: &RenderTexture| match texture {
+            Texture::Spectrum { values, scale } => Some(set.of_spectrum(values) * *scale),
+            _ => None,
+        };
+        let spectra = self.list.iter().map(values).collect();
+        Self { seen: Some(Seen { at: set, spectra }), ..self.clone() }
     }
 
     /// The number which a texture holds at a point: the chosen channel of an image, the luminance of a
@@ -283,6 +296,10 @@ impl Textures {
     /// what is filtered in closed form; of a solid texture that of a slice through it.
     pub fn average(&self, index: u32) -> Rgb {
         const N: u32 = 32;
+        if let Texture::Spectrum { values, scale } = &self.list[index as usize] {
+            // Of a colour outside of the gamut all channels count.
+            return (color_of(values) * *scale).abs();
+        }
         if let Texture::Image { file, .. } = &self.list[index as usize] {
             return image::average(&file.base);
         }
