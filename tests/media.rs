@@ -123,8 +123,8 @@ fn a_pencil_of_light_is_as_bright_as_the_closed_form_says() {
             ),
         )
     };
-    let paths = render(&text(0.1, 0.3), (32, 32), 2048).mean();
-    paths.assert_agrees("light rays", expected(0.1, 0.3), 1e-2);
+    let paths = render(&text(0.2, 0.4), (32, 32), 1024).mean();
+    paths.assert_agrees("light rays", expected(0.2, 0.4), 1e-2);
     let photons = "integrator: Sppm, photons: (direct: Photons, per_pass: Some(262144))";
     let text = text(0.5, 1.0).replace("integrator: Path", photons);
     let (mean, error) = mean_of_seeds(&text, (16, 16), 16);

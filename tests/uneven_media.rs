@@ -97,14 +97,15 @@ fn an_even_texture_is_an_even_medium() {
     let half = r#""density": Gradient(a: 0.5, b: 0.5)"#;
     let slab = in_fog(
         "roulette_depth: 30, max_depth: 4000",
-        "scattering: (coefficient: (1.8, 1.8, 1.8)), attenuation: (color: (0.8187308, 0.8187308, 0.8187308))",
+        "scattering: (coefficient: (1, 1, 1)), attenuation: (color: (0.36787945, 0.36787945, 0.36787945))",
         half,
         r#""camera": (transform: (translation: (0, 0, 6), look_at: (0, 0, 0)), camera: (orthographic: Some(0.1))),
         "slab": (transform: (translation: (0, 0, -25)), shape: Box(size: (400, 400, 50)), material: "fog"),
         "sky": (light: Sky(radiance: 1))"#,
     );
-    render(&slab, (16, 16), 1024).mean().assert_agrees("half-space", 0.414_947_5, 5e-3);
-    for (sigma_s, sigma_a, expected) in [(0.2, 0.0, 0.019_062_869_5), (1.0, 1.0, 0.000_623_379_814)]
+    render(&slab, (16, 16), 1024).mean().assert_agrees("half-space", 0.115_225_9, 5e-3);
+    for (sigma_s, sigma_a, expected, samples) in
+        [(0.2, 0.0, 0.019_062_869_5, 1024), (1.0, 1.0, 0.000_623_379_814, 6144)]
     {
         let text = in_fog(
             "max_depth: 1",
@@ -119,7 +120,7 @@ fn an_even_texture_is_an_even_medium() {
             "wall": (transform: (translation: (0, 0, -3)), shape: Rectangle(size: (1, 1)), material: "black"),
             "lamp": (transform: (translation: (0, 1, 0)), light: Point(intensity: (1, 1, 1)))"#,
         );
-        let seen = render(&text, (16, 16), 8192).mean();
+        let seen = render(&text, (16, 16), samples).mean();
         seen.assert_agrees(&format!("airlight, {sigma_s}"), expected, 1e-2);
     }
 }
@@ -166,7 +167,7 @@ fn light_is_scattered_once_as_quadrature_says() {
         .replace(r#""thick""#, r#""fog""#)
     };
     for integrator in ["Path", "Sppm, photons: (per_pass: Some(1024))"] {
-        let seen = render(&text(integrator), (16, 16), 4096).mean();
+        let seen = render(&text(integrator), (16, 16), 2048).mean();
         seen.assert_agrees(integrator, expected, 1e-2);
     }
 }
@@ -204,7 +205,7 @@ fn of_seeds(text: &str, size: (u32, u32), samples: u32) -> Estimate {
 #[test]
 fn photons_and_paths_see_the_same_clouds() {
     let text = in_fog(
-        "roulette_depth: 4, max_depth: 10",
+        "roulette_depth: 4, max_depth: 5",
         "scattering: (coefficient: (0.5, 0.4, 0.3), phase: HenyeyGreenstein(0.4)), attenuation: (color: (0.9, 0.9, 0.8))",
         r#""density": Noise(size: 2, octaves: 2, a: 0, b: 2.5)"#,
         r#""camera": (transform: (translation: (0, 1, 5), look_at: (0, 0.2, 0)), camera: (fov: 40)),
@@ -215,11 +216,9 @@ fn photons_and_paths_see_the_same_clouds() {
     )
     .replace(r#""black":"#, r#""grey": Diffuse(albedo: 0.5), "glass": Dielectric(ior: 1.5, priority: 1), "black":"#);
     let paths = of_seeds(&text, (20, 20), 128);
-    for (integrator, samples) in [
-        ("Path, caustics: Photons", 128),
-        ("Sppm, photons: (per_pass: Some(16384))", 32),
-        ("PhotonMap, photons: (per_pass: Some(262144))", 24),
-    ] {
+    for (integrator, samples) in
+        [("Path, caustics: Photons", 128), ("Sppm, photons: (per_pass: Some(16384))", 32)]
+    {
         let text = text.replace("integrator: Path", &format!("integrator: {integrator}"));
         let photons = of_seeds(&text, (20, 20), samples);
         println!("{integrator} {photons:?} {paths:?}");
