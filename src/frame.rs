@@ -6,7 +6,7 @@ use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::SceneDescription;
 use crate::extract::{
-    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Method, Requirements,
+    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Requirements,
     Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError};
@@ -126,12 +126,6 @@ pub enum RenderError {
          `integrator: Path`, or `Auto`"
     )]
     GlowingSolids(&'static str),
-    /// A map of photons is to be read at all wavelengths.
-    #[error(
-        "the photons of `PhotonMap` are traced once, and this scene has spectra, which take many wavelengths: set \
-         `integrator: Sppm`, `Path` or `Auto`"
-    )]
-    SpectralMap,
     /// A solid whose density follows a texture has no end.
     #[error(
         "`{0}` is endless, and the `density` of its material is a texture: use a shape which ends, such as a `Box`, or an \
@@ -310,11 +304,6 @@ impl Simulation {
         if glows && method.lights_by_photons() {
             self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::GlowingSolids(method.name()));
-        }
-        let spectral = self.world.resource::<Requirements>().has(Feature::Spectra);
-        if spectral && method == Method::PhotonMap {
-            self.world.resource_mut::<Instances>().mark_unseen();
-            return Err(RenderError::SpectralMap);
         }
         if let Some(index) = self.world.resource::<Densities>().endless {
             let name = self.name_of(index).to_owned();

@@ -21,6 +21,7 @@ use crate::build::photon::{
     IrradianceMap, Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
     PlaceSettings, VolumeMap, VolumeRadius,
 };
+use crate::color::spectrum::SETS;
 use crate::description::DirectLight;
 use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
 use crate::film::{Film, Tile, TileBuffer};
@@ -390,10 +391,11 @@ impl<'a> Setting<'a> {
         let mut tiles: Vec<TileState> =
             film.tiles().into_iter().map(|tile| TileState::new(film, tile)).collect();
         let samples = self.job.settings.samples;
-        // `PhotonMap` takes its photons once for each time.
+        // `PhotonMap` takes its photons once for each time, and for each set of wavelengths.
+        let spectral = !self.scene.spectra.is_empty();
         let (groups, each) = match self.method {
-            Method::PhotonMap if self.job.has_time => {
-                let groups = samples.min(MAP_TIMES);
+            Method::PhotonMap if self.job.has_time || spectral => {
+                let groups = samples.min(if spectral { SETS } else { MAP_TIMES });
                 (groups, samples.div_ceil(groups))
             }
             Method::PhotonMap => (1, samples),
