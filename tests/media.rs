@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{render, render_description, scene};
+use common::{Estimate, mean_of_seeds, render, scene};
 use kinora::frame::{RenderError, Simulation};
 
 /// Fog as a solid without a surface of its own: index 1.
@@ -127,7 +127,7 @@ fn a_pencil_of_light_is_as_bright_as_the_closed_form_says() {
     paths.assert_agrees("light rays", expected(0.2, 0.4), 1e-2);
     let photons = "integrator: Sppm, photons: (direct: Photons, per_pass: Some(262144))";
     let text = text(0.5, 1.0).replace("integrator: Path", photons);
-    let (mean, error) = mean_of_seeds(&text, (16, 16), 16);
+    let Estimate { mean, error } = mean_of_seeds(&text, (16, 16), 16);
     let expected = expected(0.5, 1.0);
     assert!(error < 0.01 * expected, "± {error}");
     assert!((mean - expected).abs() < 4.0 * error, "{mean} ± {error}, not {expected}");
@@ -260,23 +260,6 @@ fn borders_between_equal_indices_are_no_surfaces() {
     assert_eq!(render(&text(""), (4, 4), 16).mean_of_channels(), [0.0; 3]);
 }
 
-/// Mean over the pictures of several seeds and its standard error. Pixels share photons: only pictures tell how far their
-/// means are off.
-fn mean_of_seeds(text: &str, size: (u32, u32), samples: u32) -> (f64, f64) {
-    let mut described = scene(text);
-    (described.render.size, described.render.samples) = (size, samples);
-    let means: Vec<f64> = (0..6)
-        .map(|seed| {
-            described.render.seed = seed;
-            render_description(&described, 0).mean().mean
-        })
-        .collect();
-    let n = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
-}
-
 /// Photons lose nothing either where nothing is absorbed: a ball of fog under white light, seen through its middle.
 /// What photons there are lies beside the ray as on it, so that the disks over which they are gathered make no difference.
 #[test]
@@ -294,7 +277,7 @@ fn photons_lose_nothing_where_nothing_is_absorbed() {
             "sky": (light: Sky(radiance: 1))"#,
         )
         .replace("integrator: Path", &format!("integrator: {integrator}"));
-        let (mean, error) = mean_of_seeds(&text, (16, 16), 32);
+        let Estimate { mean, error } = mean_of_seeds(&text, (16, 16), 32);
         println!("{integrator}: {mean} ± {error}");
         assert!(error < 0.01 && (mean - 1.0).abs() < 4.0 * error, "{integrator}: {mean} ± {error}");
     }
@@ -323,10 +306,13 @@ fn photons_and_paths_see_the_same_fog() {
         let text = text.replace("integrator: Path", &format!("integrator: {integrator}"));
         let photons = mean_of_seeds(&text, (20, 20), samples);
         println!("{integrator} {photons:?} {paths:?}");
-        let error = photons.1.hypot(paths.1);
-        assert!(error < 0.015 * paths.0, "{integrator}: ± {error}");
-        let difference = (photons.0 - paths.0).abs();
-        assert!(difference < 4.0 * error + 0.01 * paths.0, "{integrator}: {photons:?}, {paths:?}");
+        let error = photons.error.hypot(paths.error);
+        assert!(error < 0.015 * paths.mean, "{integrator}: ± {error}");
+        let difference = (photons.mean - paths.mean).abs();
+        assert!(
+            difference < 4.0 * error + 0.01 * paths.mean,
+            "{integrator}: {photons:?}, {paths:?}"
+        );
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Estimate, render, render_description, scene};
+use common::{mean_of_seeds, render, render_description, scene};
 use kinora::description::{LoadOptions, load_scene};
 use kinora::frame::{RenderControl, Simulation};
 
@@ -185,22 +185,6 @@ fn flames_of_uneven_density_glow() {
     render(&text, (16, 16), 1024).mean().assert_agrees("flame", expected, 5e-3);
 }
 
-/// Mean over the pictures of several seeds: pixels share photons.
-fn of_seeds(text: &str, size: (u32, u32), samples: u32) -> Estimate {
-    let mut described = scene(text);
-    (described.render.size, described.render.samples) = (size, samples);
-    let means: Vec<f64> = (0..6)
-        .map(|seed| {
-            described.render.seed = seed;
-            render_description(&described, 0).mean().mean
-        })
-        .collect();
-    let n = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / n;
-    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    Estimate { mean, error: (variance / n).sqrt() }
-}
-
 /// All methods see the same clouds: a lamp and a ball of glass in them, which throws a caustic into them, and a floor.
 #[test]
 fn photons_and_paths_see_the_same_clouds() {
@@ -215,12 +199,12 @@ fn photons_and_paths_see_the_same_clouds() {
         "lamp": (transform: (translation: (0.5, 2, 0)), shape: Sphere(radius: 0.5), emission: Radiance((9, 8, 6)))"#,
     )
     .replace(r#""black":"#, r#""grey": Diffuse(albedo: 0.5), "glass": Dielectric(ior: 1.5, priority: 1), "black":"#);
-    let paths = of_seeds(&text, (20, 20), 128);
+    let paths = mean_of_seeds(&text, (20, 20), 128);
     for (integrator, samples) in
         [("Path, caustics: Photons", 128), ("Sppm, photons: (per_pass: Some(16384))", 32)]
     {
         let text = text.replace("integrator: Path", &format!("integrator: {integrator}"));
-        let photons = of_seeds(&text, (20, 20), samples);
+        let photons = mean_of_seeds(&text, (20, 20), samples);
         println!("{integrator} {photons:?} {paths:?}");
         let error = photons.error.hypot(paths.error);
         assert!(error < 0.015 * paths.mean, "{integrator}: ± {error}");
