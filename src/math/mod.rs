@@ -11,6 +11,7 @@ pub(crate) mod profile;
 mod ray;
 mod rounding;
 mod swept;
+mod twofold;
 
 pub use bounds::Aabb;
 pub use cone::Cone;
@@ -22,3 +23,4 @@ pub use profile::{Jet, Piece, Profile, ProfileError};
 pub use ray::Ray;
 pub use rounding::{gamma, gamma_f64, offset_ray_origin};
 pub use swept::swept_bounds;
+pub(crate) use twofold::TwofoldVec3;

@@ -12,6 +12,7 @@ mod cylinder;
 mod derivatives;
 mod disk;
 mod plane;
+mod plane_of_triangle;
 mod rectangle;
 mod revolution;
 mod sphere;
@@ -20,6 +21,7 @@ mod triangle;
 pub use rectangle::{RectangleSampler, sample_solid_angle as sample_rectangle};
 pub use revolution::Revolution;
 pub use sphere::{ConeOfSphere, sample_cone as sample_sphere};
+pub(crate) use triangle::{INEXACT, OPEN};
 pub use triangle::{TriangleTest, area_of as triangle_area, sample_triangle, triangle_pdf};
 
 use crate::description::Rgb;

@@ -9,20 +9,22 @@ use super::boxes::{BoxTree, visit_boxes};
 use super::node::{BLOCK, Block, Node};
 use super::ray::{self, BoxRay, LEAST, ROUNDING, Scale, UNIT, larger, padded};
 use super::traverse::{
-    BlockHits, Distances, Lanes, Nodes, TriangleHit, WideCorners, any_hit, closest_hit,
+    BlockHits, Distances, Lanes, Nodes, TriangleHit, WideCorners, any_hit, closest_hit, take_lane,
 };
 use crate::math::Aabb;
 use crate::math::instructions::has_avx2;
-use crate::shape::{LocalRay, TriangleTest};
+use crate::shape::{INEXACT, LocalRay, OPEN, TriangleTest};
+use glam::{DVec3, Vec3};
 use std::arch::x86_64::{
     __m128, __m256, __m256d, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NEQ_UQ, _MM_HINT_T0,
     _mm_add_ps, _mm_andnot_ps, _mm_loadu_ps, _mm_max_ps, _mm_min_ps, _mm_mul_ps, _mm_permute_ps,
     _mm_prefetch, _mm_set1_ps, _mm_storeu_ps, _mm_sub_ps, _mm_xor_ps, _mm256_add_pd, _mm256_and_pd,
-    _mm256_andnot_pd, _mm256_broadcastss_ps, _mm256_cmp_pd, _mm256_cmp_ps, _mm256_cvtpd_ps,
-    _mm256_cvtps_pd, _mm256_div_pd, _mm256_fmadd_ps, _mm256_load_ps, _mm256_loadu_pd,
-    _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_min_ps, _mm256_movemask_pd,
-    _mm256_movemask_ps, _mm256_mul_pd, _mm256_or_pd, _mm256_set1_pd, _mm256_set1_ps,
-    _mm256_setzero_pd, _mm256_setzero_ps, _mm256_store_pd, _mm256_store_ps, _mm256_sub_pd,
+    _mm256_andnot_pd, _mm256_blendv_pd, _mm256_broadcastss_ps, _mm256_cmp_pd, _mm256_cmp_ps,
+    _mm256_cvtpd_ps, _mm256_cvtps_pd, _mm256_div_pd, _mm256_fmadd_ps, _mm256_load_ps,
+    _mm256_loadu_pd, _mm256_max_pd, _mm256_max_ps, _mm256_min_pd, _mm256_min_ps,
+    _mm256_movemask_pd, _mm256_movemask_ps, _mm256_mul_pd, _mm256_or_pd, _mm256_set1_pd,
+    _mm256_set1_ps, _mm256_setzero_pd, _mm256_setzero_ps, _mm256_store_pd, _mm256_store_ps,
+    _mm256_sub_pd,
 };
 
 /// The proof that this processor has the instructions.
@@ -152,6 +154,8 @@ struct TriangleLanes {
     o: [__m256d; 3],
     shear: [__m256d; 3],
     axes: [usize; 3],
+    /// What decides where rounding leaves it open.
+    whole: TriangleTest,
 }
 
 // These are functions rather than closures, since a closure cannot be made to be inlined, and outside
@@ -259,9 +263,43 @@ fn edge(p: __m256d, q: __m256d, r: __m256d, s: __m256d) -> __m256d {
     unsafe { _mm256_sub_pd(_mm256_mul_pd(p, q), _mm256_mul_pd(r, s)) }
 }
 
-/// The test of four triangles by their sheared corners.
+/// The largest of three numbers without their signs.
 #[inline(always)]
-fn test(corners: [Sheared; 3], shear_z: __m256d, t_max: f64, hits: &mut BlockHits) -> u32 {
+fn largest(a: __m256d, b: __m256d, c: __m256d) -> __m256d {
+    // SAFETY: runs only inside the functions with the features.
+    unsafe {
+        let minus = _mm256_set1_pd(-0.0);
+        let ab = _mm256_max_pd(_mm256_andnot_pd(minus, a), _mm256_andnot_pd(minus, b));
+        _mm256_max_pd(ab, _mm256_andnot_pd(minus, c))
+    }
+}
+
+/// Asks about the open lanes one by one; returns the mask with those of them that are hit.
+#[cold]
+#[inline(never)]
+fn decide(
+    (mut mask, mut open): (u32, u32),
+    ray: &TriangleTest,
+    t_max: f64,
+    hits: &mut BlockHits,
+    corners: impl Fn(usize) -> [DVec3; 3],
+) -> u32 {
+    while open != 0 {
+        let lane = take_lane(&mut open) % BLOCK;
+        mask &= !(1 << lane);
+        if let Some((t, weights)) = ray.decide(corners(lane), t_max) {
+            hits.t[lane] = t;
+            (hits.second[lane], hits.third[lane]) = (weights.x, weights.y);
+            mask |= 1 << lane;
+        }
+    }
+    mask
+}
+
+/// The test of four triangles by their sheared corners: which are hit, and which of them or of the others are
+/// open.
+#[inline(always)]
+fn test(corners: [Sheared; 3], shear_z: __m256d, t_max: f64, hits: &mut BlockHits) -> (u32, u32) {
     let [(ax, ay, az), (bx, by, bz), (cx, cy, cz)] = corners;
     // SAFETY: runs only inside the functions with the features. The rows of
     // the hits are 32 bytes long in a type aligned to 32.
@@ -278,7 +316,7 @@ fn test(corners: [Sheared; 3], shear_z: __m256d, t_max: f64, hits: &mut BlockHit
             _mm256_cmp_pd::<_CMP_NEQ_UQ>(det, zero),
         );
         if _mm256_movemask_pd(inside) == 0 {
-            return 0;
+            return (0, 0);
         }
         let inverse = _mm256_div_pd(_mm256_set1_pd(1.0), det);
         let depth = _mm256_add_pd(
@@ -296,7 +334,15 @@ fn test(corners: [Sheared; 3], shear_z: __m256d, t_max: f64, hits: &mut BlockHit
             _mm256_store_pd(hits.second.as_mut_ptr(), _mm256_mul_pd(v, inverse));
             _mm256_store_pd(hits.third.as_mut_ptr(), _mm256_mul_pd(w, inverse));
         }
-        mask
+        // `is_open` of the plain test, by the same operations.
+        let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
+        let across = _mm256_add_pd(_mm256_mul_pd(x, y), _mm256_mul_pd(z, _mm256_add_pd(x, y)));
+        let doubt = _mm256_mul_pd(_mm256_mul_pd(z, across), _mm256_set1_pd(OPEN));
+        let ahead = _mm256_cmp_pd::<_CMP_GT_OQ>(t, zero);
+        let share = _mm256_blendv_pd(_mm256_set1_pd(1.0), _mm256_set1_pd(INEXACT), ahead);
+        let known = _mm256_mul_pd(_mm256_andnot_pd(_mm256_set1_pd(-0.0), depth), share);
+        let open = _mm256_and_pd(inside, _mm256_cmp_pd::<_CMP_LT_OQ>(known, doubt));
+        (mask, _mm256_movemask_pd(open) as u32)
     }
 }
 
@@ -360,7 +406,8 @@ impl Lanes for Vectors {
         let axes = test.axes;
         let o = test.o.to_array();
         let o = [o[axes[0]], o[axes[1]], o[axes[2]]];
-        TriangleLanes { o: wide_lanes_of(o), shear: wide_lanes_of(test.shear.to_array()), axes }
+        let shear = wide_lanes_of(test.shear.to_array());
+        TriangleLanes { o: wide_lanes_of(o), shear, axes, whole: *test }
     }
 
     #[inline(always)]
@@ -396,7 +443,13 @@ impl Lanes for Vectors {
     #[inline(always)]
     fn hit(ray: &TriangleLanes, block: &Block, t_max: f64, hits: &mut BlockHits) -> u32 {
         let [a, b, c] = &block.corners;
-        test([seen(ray, a), seen(ray, b), seen(ray, c)], ray.shear[2], t_max, hits)
+        let corners = [seen(ray, a), seen(ray, b), seen(ray, c)];
+        let (mask, open) = test(corners, ray.shear[2], t_max, hits);
+        if open == 0 {
+            return mask;
+        }
+        let corners = |lane| block.get(lane).map(Vec3::as_dvec3);
+        decide((mask, open), &ray.whole, t_max, hits, corners)
     }
 
     #[inline(always)]
@@ -407,8 +460,12 @@ impl Lanes for Vectors {
         hits: &mut BlockHits,
     ) -> u32 {
         let [a, b, c] = &corners.0;
-        let corners = [wide_seen(ray, a), wide_seen(ray, b), wide_seen(ray, c)];
-        test(corners, ray.shear[2], t_max, hits)
+        let seen = [wide_seen(ray, a), wide_seen(ray, b), wide_seen(ray, c)];
+        let (mask, open) = test(seen, ray.shear[2], t_max, hits);
+        if open == 0 {
+            return mask;
+        }
+        decide((mask, open), &ray.whole, t_max, hits, |lane| corners.get(lane))
     }
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use super::ray::BoxRay;
 use super::*;
 use crate::build::bvh::Bvh;
 use crate::shape::TriangleTest;
-use glam::{DVec2, DVec3, Quat, Vec3};
+use glam::{DQuat, DVec2, DVec3, Quat, Vec3, Vec3Swizzles};
 
 fn mesh_of(raw: RawMesh) -> TriangleMesh {
     TriangleMesh { positions: raw.positions, triangles: raw.triangles, ..Default::default() }
@@ -364,4 +364,84 @@ fn better_trees_find_the_same_for_less() {
     let [fast, balanced, best] =
         BvhQuality::ALL.map(|quality| cost(&WideTree::build(&larger, quality)));
     assert!(best < 0.97 * balanced && balanced < fast, "{best}, {balanced}, {fast}");
+}
+
+/// Strips of this length along z and half a metre wide, side by side at y = 0, which share their corners.
+fn strips(length: f64) -> RawMesh {
+    let mut mesh = RawMesh::default();
+    for k in 0..=24 {
+        let x = 0.5 * (k as f32 - 12.0);
+        mesh.positions.extend([-0.5, 0.5].map(|end| Vec3::new(x, 0.0, (end * length) as f32)));
+    }
+    for k in (0..48).step_by(2) {
+        mesh.triangles.extend([[k, k + 1, k + 3], [k, k + 3, k + 2]]);
+    }
+    mesh
+}
+
+/// A ray down to a ground of such strips, from between a millimetre and ten metres above it to a place up to
+/// nearly its end.
+fn down(length: f64, number: u64) -> LocalRay {
+    let mut u = Uniforms(number);
+    let mut one = || f64::from(u.one());
+    let o = DVec3::new(one() - 0.5, 10.0_f64.powf(4.0 * one() - 3.0), one() - 0.5);
+    let away = 10.0_f64.powf(one() * (0.45 * length).log10());
+    let target = DVec3::new(10.0 * one() - 5.0, 0.0, if one() < 0.5 { away } else { -away });
+    LocalRay { o, d: (target - o).normalize() }
+}
+
+/// Oracle: the plane, in closed form; on either set of instructions the same bits. Twenty thousand million
+/// times as long as wide, seen from a millimetre above: no ray passes, and each hit is where the plane is to
+/// half a rounding of `f32`.
+#[test]
+fn ground_of_long_thin_strips_lets_no_ray_through() {
+    for (exponent, axis) in (2..11).flat_map(|exponent| (0..3).map(move |axis| (exponent, axis))) {
+        let length = 2.0 * 10.0_f64.powi(exponent);
+        let raw = strips(length).map(|p| [p, p.yzx(), p.zxy()][axis]);
+        let mesh = mesh_of(raw);
+        let quality = BvhQuality::ALL[exponent as usize % 3];
+        let tree = WideTree::build_with_budget(&mesh, quality, SPLITS);
+        for number in 0..300 {
+            let ray = down(length, number);
+            let turned = |v: DVec3| {
+                let turns = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
+                DVec3::from_array(turns[axis].map(|k| v[k]))
+            };
+            let exact = -ray.o.y / ray.d.y;
+            let ray = LocalRay { o: turned(ray.o), d: turned(ray.d) };
+            let find = |with| tree.closest_hit_by(with, &ray, f64::INFINITY);
+            let hits: Vec<_> = all_instructions().into_iter().map(find).collect();
+            for (hit, with) in hits.iter().zip(all_instructions()) {
+                let what = format!("{length:e} m, axis {axis}, ray {number} by {with:?}: {ray:?}");
+                let t = hit.unwrap_or_else(|| panic!("{what} passes")).t;
+                let error = (t / exact - 1.0).abs();
+                assert!(error <= f64::from(f32::EPSILON) * 0.25, "{what}: off by {error:e}");
+                assert_eq!(*hit, hits[0], "{what}");
+                assert!(tree.any_hit_by(with, &ray, f64::INFINITY), "{what}");
+                let short = tree.any_hit_by(with, &ray, exact * (1.0 - f64::from(f32::EPSILON)));
+                assert!(!short, "{what} is met too early");
+            }
+        }
+    }
+}
+
+/// Oracle: none but that ground is closed. Turned, its corners are those that `f32` can hold.
+#[test]
+fn turned_ground_of_long_thin_strips_lets_no_ray_through() {
+    let turn = DQuat::from_scaled_axis(DVec3::new(0.3, 0.9, -0.7));
+    for exponent in 2..6 {
+        let length = 2.0 * 10.0_f64.powi(exponent);
+        let mesh = mesh_of(strips(length).map(|p| (turn * p.as_dvec3()).as_vec3()));
+        let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
+        for number in 0..600 {
+            let ray = down(length, number);
+            // Above what the rounding of the corners lifts.
+            let o = turn * (ray.o + DVec3::Y * 0.1);
+            let ray = LocalRay { o, d: turn * ray.d };
+            for with in all_instructions() {
+                let hit = tree.closest_hit_by(with, &ray, f64::INFINITY);
+                assert!(hit.is_some(), "{length:e} m, ray {number} by {with:?} passes: {ray:?}");
+            }
+        }
+    }
 }

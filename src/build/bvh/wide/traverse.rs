@@ -46,6 +46,13 @@ pub(super) struct Distances(pub(super) [f32; WIDTH]);
 #[repr(align(32))]
 pub(super) struct WideCorners(pub(super) [[[f64; BLOCK]; 3]; 3]);
 
+impl WideCorners {
+    /// The corners of a triangle.
+    pub(super) fn get(&self, lane: usize) -> [DVec3; 3] {
+        self.0.map(|corner| DVec3::from_array(corner.map(|row| row[lane])))
+    }
+}
+
 /// What is traversed: nodes and blocks as they are at the time of the ray.
 ///
 /// A tree at rest has them in memory; one that moves makes them, and nothing of that is in the code
@@ -183,8 +190,7 @@ impl Lanes for Portable {
     ) -> u32 {
         let mut mask = 0;
         for lane in 0..BLOCK {
-            let triangle = corners.0.map(|corner| DVec3::from_array(corner.map(|row| row[lane])));
-            if let Some((t, weights)) = ray.intersect_exact(triangle, t_max) {
+            if let Some((t, weights)) = ray.intersect_exact(corners.get(lane), t_max) {
                 hits.t[lane] = t;
                 (hits.second[lane], hits.third[lane]) = (weights.x, weights.y);
                 mask |= 1 << lane;
