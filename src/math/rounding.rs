@@ -41,21 +41,25 @@ fn round_along(x: f64, direction: f64) -> f32 {
 ///
 /// The error box projected on the normal is `d = |n|·δ`; the origin moves by `d` along the normal
 /// and is then rounded away from the surface, so that the rounding cannot bring it back (Pharr,
-/// Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed., section 6.8.6).
+/// Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed., section 6.8.6). It is rounded away
+/// also where `d` is 0, as on a plane through the origin of render space.
 #[inline]
 pub fn offset_ray_origin(p: DVec3, p_error: DVec3, ng: Vec3, dir: Vec3) -> Vec3 {
     let n = ng.as_dvec3();
     // Where the offset has no component the nearest number is taken, which may move the point by half
     // a unit in the last place; rounding along the offset undoes that on the other axes.
     let half_ulp = p.abs() * (f64::from(f32::EPSILON) * 0.5);
-    let distance = n.abs().dot(p_error + half_ulp);
-    let side = if dir.dot(ng) < 0.0 { -1.0 } else { 1.0 };
-    let offset = n * (distance * side);
-    let moved = p + offset;
+    // A component of the normal that is nothing but rounding may have either sign.
+    let tilt = half_ulp.max_element() * gamma_f64(8);
+    let distance = n.abs().dot(p_error + half_ulp) + tilt;
+    // In f64, in which the products are exact: near the horizon the sum of rounded ones may have either sign.
+    let side = if dir.as_dvec3().dot(n) < 0.0 { -1.0 } else { 1.0 };
+    let away = n * side;
+    let moved = p + away * distance;
     Vec3::new(
-        round_along(moved.x, offset.x),
-        round_along(moved.y, offset.y),
-        round_along(moved.z, offset.z),
+        round_along(moved.x, away.x),
+        round_along(moved.y, away.y),
+        round_along(moved.z, away.z),
     )
 }
 

@@ -8,6 +8,8 @@
 //! `tree` holds the binary tree that the top level is made from.
 
 mod geometry;
+#[cfg(test)]
+mod leaving;
 mod mesh_tree;
 mod movers;
 mod resting;

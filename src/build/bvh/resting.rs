@@ -10,7 +10,6 @@
 use super::{MeshTree, WideTree};
 use crate::description::{BvhQuality, TriangleMesh};
 use crate::extract::{FrameOrigin, Meshes, RestingMesh, RestingMeshes};
-use crate::math::gamma_f64;
 use crate::world::Settings;
 use bevy_ecs::prelude::*;
 use glam::{DVec3, Vec3};
@@ -162,13 +161,6 @@ fn may_join(member: &RestingMesh, mesh: &TriangleMesh, origin: DVec3) -> bool {
     let mean_edge = edges / (3 * mesh.triangles.len()) as f64;
     // False for what is not finite, and for a mesh without triangles.
     reach * f64::from(f32::EPSILON) * 0.5 <= WORST_ROUNDING * mean_edge && reach.is_finite()
-}
-
-/// Bound per axis of the error of a point of a triangle that was computed in `f64` from its corners
-/// and shifted to render space: three products, three sums, and the way back of the next ray.
-pub(super) fn point_error(corners: [DVec3; 3], shift: DVec3, p: DVec3) -> DVec3 {
-    let reach = corners.iter().fold(DVec3::ZERO, |reach, v| reach.max(v.abs()));
-    (reach + shift.abs() + p.abs()) * gamma_f64(8)
 }
 
 /// Builds [`RestingTree`] anew when a mesh came to rest, left, or is at another place.

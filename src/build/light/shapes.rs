@@ -2,6 +2,7 @@
 
 use super::towards::{is_perpendicular, is_similarity};
 use super::{Emitter, LightTable, Receiver};
+use crate::build::bvh::SurfacePoint;
 use crate::extract::{Geometry, Instance, Instances};
 use crate::math::MotionTransform;
 use crate::shape::{ConeOfSphere, Primitive, RectangleSampler, rounding_error, sample_rectangle};
@@ -40,11 +41,12 @@ impl ShapeLight {
                 Self::Rectangle(Box::new(RectangleLight::new(forward, inverse)))
             }
             Primitive::Sphere if is_similarity(forward) && !instance.needs_uv => {
-                Self::Sphere(SphereLight {
-                    centre: forward.translation,
-                    radius: m.x_axis.length(),
-                    p_error: rounding_error(forward, DVec3::ONE),
-                })
+                // Of a point on it, and of the way back of the ray which ends there.
+                let (centre, radius) = (forward.translation, m.x_axis.length());
+                let back = rounding_error(inverse, centre.abs() + radius);
+                let p_error =
+                    rounding_error(forward, DVec3::ONE) + 2.0 * radius * back.max_element();
+                Self::Sphere(SphereLight { centre, radius, p_error })
             }
             _ => Self::Other,
         }
@@ -101,7 +103,10 @@ impl RectangleLight {
         let p_error = corners
             .iter()
             .flatten()
-            .map(|&corner| rounding_error(forward, corner))
+            .map(|&corner| {
+                let local = Primitive::Rectangle.surface(corner, 0, false);
+                SurfacePoint::new(&local, forward, inverse).p_error
+            })
             .fold(DVec3::ZERO, DVec3::max);
         Self {
             centre: forward.translation,
