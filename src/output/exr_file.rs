@@ -3,7 +3,7 @@
 //! The custom facts are **one** text attribute `kinora` holding a JSON object. The encoder keeps custom
 //! attributes in a hash map with a random order; with a single entry equal frames are equal files,
 //! byte for byte. Standard attributes carry what they can: `software`, `worldToCamera`,
-//! `framesPerSecond`, `chromaticities`.
+//! `framesPerSecond`, `chromaticities`. Text is UTF-8, as OpenEXR has it since its version 2.0.
 
 use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
 use crate::color::CHROMATICITIES;
@@ -149,7 +149,7 @@ pub fn read_metadata(path: &Path) -> Result<Option<FrameMetadata>, ExrError> {
     let attribute =
         headers.first().and_then(|header| header.own_attributes.other.get(ATTRIBUTE.as_bytes()));
     Ok(match attribute {
-        Some(AttributeValue::Text(text)) => serde_json::from_str(&text.to_string()).ok(),
+        Some(AttributeValue::Text(text)) => serde_json::from_slice(text.as_slice()).ok(),
         _ => None,
     })
 }
@@ -167,11 +167,16 @@ fn layer_attributes(
 ) -> Result<LayerAttributes, OutputError> {
     let json = serde_json::to_string(metadata).map_err(|source| OutputError::Json { source })?;
     let mut attributes = LayerAttributes::named(layer_name(layer));
-    attributes.software_name = Some(Text::from(metadata.software.as_str()));
+    attributes.software_name = Some(text(&metadata.software));
     attributes.world_to_camera = Some(row_vector_convention(metadata.world_to_camera));
     attributes.frames_per_second = rational(metadata.fps);
-    attributes.other.insert(Text::from(ATTRIBUTE), AttributeValue::Text(Text::from(json.as_str())));
+    attributes.other.insert(text(ATTRIBUTE), AttributeValue::Text(text(&json)));
     Ok(attributes)
+}
+
+/// Text as UTF-8. The encoder's own conversion takes each letter for a byte and panics beyond Latin-1.
+fn text(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
 }
 
 /// OpenEXR (Imath) multiplies row vectors from the left and stores rows: that is our column-major order
@@ -289,6 +294,20 @@ pub(super) mod tests {
         assert_eq!(attributes.world_to_camera.expect("set")[12..15], [1.0, 2.0, 3.0]);
         assert_eq!(attributes.frames_per_second, Some((24_000, 1000)));
         assert!(back.attributes.chromaticities.is_some());
+    }
+
+    #[test]
+    fn names_in_any_script_are_written_and_read_back() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("f.exr");
+        let settings = RenderSettings::default();
+        let film = film(&[0.5], &settings.layers);
+        for name in ["камера", "カメラ", "κάμερα", "żółć", "é\u{301}", "📷", "\0\u{10ffff}\"\\"]
+        {
+            let metadata = FrameMetadata { camera: name.to_owned(), ..metadata(7) };
+            write_exr(&path, &film, &settings, &metadata).expect("writable");
+            assert_eq!(read_metadata(&path).expect("just written"), Some(metadata));
+        }
     }
 
     #[test]
