@@ -1,5 +1,6 @@
 //! What can go wrong in a command, and the exit code that says so.
 
+use super::progress::say;
 use kinora::output::OutputError;
 use std::error::Error;
 use std::io::{self, IsTerminal};
@@ -56,15 +57,15 @@ impl Failure {
         match self {
             Self::Diagnostics { plain, styled } => {
                 let text = if io::stderr().is_terminal() { styled } else { plain };
-                eprintln!("{}", text.trim_end());
+                say(text.trim_end());
             }
-            Self::Interrupted { .. } => eprintln!("{self}"),
+            Self::Interrupted { .. } => say(&self.to_string()),
             Self::Stdout(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
             _ => {
-                eprintln!("error: {self}");
+                say(&format!("error: {self}"));
                 let mut cause = self.source();
                 while let Some(error) = cause {
-                    eprintln!("  because: {error}");
+                    say(&format!("  because: {error}"));
                     cause = error.source();
                 }
             }

@@ -1,8 +1,8 @@
 //! Ctrl-C and SIGTERM: end cleanly, keep what is finished.
 
 use super::failure::INTERRUPTED;
+use super::progress::say;
 use kinora::frame::RenderControl;
-use std::io::Write;
 use std::sync::atomic::Ordering;
 
 /// From now on Ctrl-C, SIGTERM and SIGHUP set [`RenderControl::cancel`]: the frame being rendered is
@@ -14,11 +14,10 @@ pub fn cancel_on_signal(control: &RenderControl) {
         if cancel.swap(true, Ordering::SeqCst) {
             std::process::exit(i32::from(INTERRUPTED));
         }
-        // Not `eprintln!`: it panics where a hang-up has closed the terminal.
-        let _ = writeln!(std::io::stderr(), "\nstopping; once more to stop at once");
+        say("\nstopping; once more to stop at once");
     };
     if let Err(error) = ctrlc::set_handler(handler) {
         // Rendering works without it, only less gracefully stopped.
-        eprintln!("warning: cannot catch Ctrl-C: {error}");
+        say(&format!("warning: cannot catch Ctrl-C: {error}"));
     }
 }

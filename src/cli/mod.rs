@@ -14,14 +14,18 @@ mod survey;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
-use failure::INTERNAL;
+use failure::{Failure, INTERNAL};
+use progress::say;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::process::ExitCode;
 
 /// Runs the command that was typed and answers with its exit code.
 pub fn main() -> ExitCode {
     std::panic::set_hook(Box::new(report_panic));
-    let arguments = Arguments::parse(); // ends the program by itself on --help and on misuse (2)
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(answer) => return print_answer(&answer),
+    };
     let outcome = catch_unwind(AssertUnwindSafe(|| match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
@@ -36,14 +40,26 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Prints what was typed for: the help, the version, or what is wrong with the words (code 2).
+fn print_answer(answer: &clap::Error) -> ExitCode {
+    match answer.print() {
+        Err(error) if !answer.use_stderr() => {
+            let failure = Failure::from(error);
+            failure.print();
+            ExitCode::from(failure.exit_code())
+        }
+        _ => ExitCode::from(answer.exit_code() as u8),
+    }
+}
+
 /// A panic is our mistake, never the user's: say so in short.
 fn report_panic(info: &PanicHookInfo<'_>) {
     let place =
         info.location().map_or_else(String::new, |at| format!(" ({}:{})", at.file(), at.line()));
     let what = info.payload_as_str().unwrap_or("unknown");
-    eprintln!(
+    say(&format!(
         "internal error: {what}{place}\n\
          This is a mistake in kinora, not in your scene. Frames which are finished are kept.\n\
          Please report it with this message and, if you can, the scene."
-    );
+    ));
 }

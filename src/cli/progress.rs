@@ -4,6 +4,7 @@
 //! counters a few times a second and draws.
 
 use super::arguments::ProgressForm;
+use super::failure::Failure;
 use super::format;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use kinora::frame::RenderControl;
@@ -12,7 +13,7 @@ use serde_json::{Value, json};
 use std::collections::HashSet;
 use std::io::{self, IsTerminal, Write};
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -30,9 +31,13 @@ pub struct Progress {
 enum View {
     Bars(Bars),
     Lines,
-    Json,
+    Json(Events),
     None,
 }
+
+/// JSON on stdout, and the first error of writing it: the pictures are finished all the same.
+#[derive(Clone, Default)]
+struct Events(Arc<Mutex<Option<io::Error>>>);
 
 /// One bar for the sequence, one for the frame.
 #[derive(Clone)]
@@ -49,13 +54,13 @@ impl Progress {
     pub fn new(form: ProgressForm, control: &RenderControl, pending: usize) -> Self {
         let view = match form {
             ProgressForm::None => View::None,
-            ProgressForm::Json => View::Json,
+            ProgressForm::Json => View::Json(Events::default()),
             ProgressForm::Human if io::stderr().is_terminal() => View::Bars(Bars::new(pending)),
             ProgressForm::Human => View::Lines,
         };
         let watcher = match view {
             View::Bars(_) => Some((Duration::from_millis(100), view.clone())),
-            View::Json => Some((Duration::from_secs(1), view.clone())),
+            View::Json(_) => Some((Duration::from_secs(1), view.clone())),
             View::Lines | View::None => None,
         };
         let watcher = watcher.map(|(every, view)| Watcher::start(every, view, control.clone()));
@@ -67,7 +72,7 @@ impl Progress {
         match &self.view {
             View::Bars(bars) => bars.print(text),
             View::Lines => say(text),
-            View::Json => event("start", facts),
+            View::Json(events) => events.send("start", facts),
             View::None => {}
         }
     }
@@ -95,7 +100,7 @@ impl Progress {
                 format::count(entry.report.rays as f64 / seconds.max(f64::MIN_POSITIVE)),
                 entry.files.join(", ")
             )),
-            View::Json => event(
+            View::Json(events) => events.send(
                 "frame",
                 json!({
                     "frame": entry.frame, "done": self.done, "of": self.pending,
@@ -117,13 +122,15 @@ impl Progress {
         match &self.view {
             View::Bars(bars) => bars.print(&format!("{label}{text}")),
             View::Lines => say(&format!("{label}{text}")),
-            View::Json => event("warning", json!({ "text": text })),
+            View::Json(events) => events.send("warning", json!({ "text": text })),
             View::None => {}
         }
     }
 
     /// The end: takes the bars away; `text` for people, `facts` for programs.
-    pub fn end(mut self, text: &str, facts: Value) {
+    ///
+    /// An error says that events were lost on the way.
+    pub fn end(mut self, text: &str, facts: Value) -> Result<(), Failure> {
         drop(self.watcher.take());
         if let View::Bars(bars) = &self.view {
             bars.frame.finish_and_clear();
@@ -131,25 +138,38 @@ impl Progress {
         }
         match &self.view {
             View::Bars(_) | View::Lines if !text.is_empty() => say(text),
-            View::Json => event("end", facts),
+            View::Json(events) => {
+                events.send("end", facts);
+                return events.lock().take().map_or(Ok(()), |error| Err(error.into()));
+            }
             _ => {}
         }
+        Ok(())
     }
 }
 
-/// Progress is lost quietly where nobody listens any more; the pictures are what counts.
-fn say(text: &str) {
+/// Tells people something on stderr. It is lost quietly where nobody listens any more, and where `eprintln!` would
+/// panic: the pictures and the exit code are what counts.
+pub fn say(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// One object on one line, with `event` as its first field.
-fn event(name: &str, facts: Value) {
-    let mut line = serde_json::Map::from_iter([("event".to_owned(), Value::from(name))]);
-    if let Value::Object(fields) = facts {
-        line.extend(fields);
+impl Events {
+    /// One object on one line, with `event` as its first field.
+    fn send(&self, name: &str, facts: Value) {
+        let mut line = serde_json::Map::from_iter([("event".to_owned(), Value::from(name))]);
+        if let Value::Object(fields) = facts {
+            line.extend(fields);
+        }
+        let mut out = io::stdout().lock();
+        if let Err(error) = writeln!(out, "{}", Value::Object(line)).and_then(|()| out.flush()) {
+            self.lock().get_or_insert(error);
+        }
     }
-    let mut out = io::stdout().lock();
-    let _ = writeln!(out, "{}", Value::Object(line)).and_then(|()| out.flush());
+
+    fn lock(&self) -> MutexGuard<'_, Option<io::Error>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Bars {
@@ -238,8 +258,8 @@ impl Shared {
         self.changed.notify_all();
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Watched> {
-        self.watched.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Watched> {
+        self.watched.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -281,7 +301,7 @@ fn watch(shared: &Shared, every: Duration, view: &View, control: &RenderControl)
         let now = Instant::now();
         if now < next {
             let wait = shared.changed.wait_timeout(watched, next - now);
-            watched = wait.unwrap_or_else(std::sync::PoisonError::into_inner).0;
+            watched = wait.unwrap_or_else(PoisonError::into_inner).0;
             continue;
         }
         next = now + every;
@@ -302,7 +322,7 @@ fn watch(shared: &Shared, every: Duration, view: &View, control: &RenderControl)
 fn show(view: &View, snapshot: &Snapshot, since_start: Duration) {
     match view {
         View::Bars(bars) => bars.draw(snapshot, since_start),
-        View::Json => event(
+        View::Json(events) => events.send(
             "progress",
             json!({
                 "frame": snapshot.frame, "seconds": snapshot.elapsed.as_secs_f64(),
