@@ -174,6 +174,83 @@ fn the_files_do_not_depend_on_the_number_of_threads() {
     }
 }
 
+#[test]
+fn a_camera_may_be_named_in_any_script() {
+    let folder = folder();
+    fs::write(folder.path().join("a.ron"), SCENE.replace("camera\"", "камера 写真機\""))
+        .expect("writable");
+    let small = ["render", "a.ron", "--size", "8x8", "--samples", "1", "--frames", "0"];
+    for arguments in [&small[..], &[&small[..], &["--camera", "камера 写真機"]].concat()] {
+        let output = kinora(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
+    let metadata = kinora::output::read_metadata(&folder.path().join("out/a/a.0000.exr"));
+    let metadata = metadata.expect("just written").expect("has facts");
+    assert_eq!(metadata.camera, "камера 写真機");
+}
+
+/// `/dev/full` refuses every byte; a pipe whose reader is gone breaks.
+#[cfg(target_os = "linux")]
+#[test]
+fn streams_that_refuse_the_report_change_no_exit_code_of_stderr_and_make_74_of_stdout() {
+    let folder = folder();
+    fs::write(folder.path().join("a.ron"), SCENE).expect("writable");
+    fs::write(folder.path().join("wrong.ron"), "Scene(entities: 5)").expect("writable");
+    let run = |words: &str, redirected: &str| {
+        let program = env!("CARGO_BIN_EXE_kinora");
+        let script =
+            format!("exec 3>&1; {{ {program} {words} {redirected}; echo $? >&3; }} | exec true");
+        let output = Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output();
+        let code = String::from_utf8(output.expect("sh exists").stdout).expect("a number");
+        code.trim().parse::<i32>().unwrap_or_else(|_| panic!("{words} {redirected}: {code:?}"))
+    };
+    let render = "render a.ron --size 8x8 --samples 1 --frames 0-1 --fresh";
+    for redirected in ["2>/dev/full", "2>&1 1>/dev/null", "2>&-"] {
+        assert_eq!(run("check wrong.ron", redirected), 1, "{redirected}");
+        assert_eq!(run("render nowhere.ron", redirected), 1, "{redirected}");
+        assert_eq!(run("paint", redirected), 2, "{redirected}");
+        assert_eq!(run("check a.ron", redirected), 0, "{redirected}");
+        assert_eq!(run(render, redirected), 0, "{redirected}");
+        assert_eq!(run("render a.ron --out a.ron/deep", redirected), 74, "{redirected}");
+    }
+    for words in ["check a.ron", "--help", "--version", &format!("{render} --progress json")] {
+        assert_eq!(run(words, ">/dev/full"), 74, "{words}");
+        assert_eq!(run(words, ">/dev/full 2>&1"), 74, "{words}");
+        assert_eq!(run(words, ""), 0, "{words}: a reader that has seen enough is no failure");
+    }
+    assert!(folder.path().join("out/a/a.0001.png").exists(), "what was rendered is kept");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn paths_that_are_not_unicode_work() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder();
+    let at = |name: &[u8]| folder.path().join(OsStr::from_bytes(name));
+    for name in [&b"sc\xff"[..], b"as\xfe"] {
+        fs::create_dir(at(name)).expect("Linux takes any bytes");
+    }
+    let scene = SCENE.replace("Scene(", "Scene(include: [\"more.ron\"],");
+    fs::write(at(b"sc\xff/\xfd.ron"), scene).expect("writable");
+    fs::write(at(b"as\xfe/more.ron"), "Scene()").expect("writable");
+    for (out, progress) in [(None, "json"), (Some(at(b"o\xfc")), "human")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinora"));
+        command.current_dir(folder.path()).arg("render").arg(at(b"sc\xff/\xfd.ron"));
+        command.args(["--size", "8x8", "--samples", "1", "--frames", "0", "--progress", progress]);
+        command.arg("--assets").arg(at(b"as\xfe"));
+        command.args(out.iter().flat_map(|out| [OsStr::new("--out"), out.as_os_str()]));
+        let output = command.output().expect("the program starts");
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let out = out.unwrap_or_else(|| at(b"out/\xfd"));
+        let record = fs::read(out.join("manifest.json")).expect("was written");
+        let record: serde_json::Value = serde_json::from_slice(&record).expect("is JSON");
+        for file in record["frames"][0]["files"].as_array().expect("list") {
+            assert!(out.join(file.as_str().expect("text")).exists(), "{file} of the record");
+        }
+    }
+}
+
 /// The manifest is the first file of a run: when it is there, the render is under way.
 #[cfg(unix)]
 #[test]

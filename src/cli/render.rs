@@ -57,15 +57,13 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     for warning in summary.warnings() {
         progress.warn(&warning);
     }
-    match &outcome {
-        Ok(()) => progress
-            .end(&summary.for_people(&job.folder), summary.for_programs("done", &job.folder)),
-        Err(Failure::Interrupted { .. }) => {
-            progress.end("", summary.for_programs("interrupted", &job.folder));
-        }
-        Err(_) => progress.end("", summary.for_programs("failed", &job.folder)),
-    }
-    outcome
+    let (text, state) = match &outcome {
+        Ok(()) => (summary.for_people(&job.folder), "done"),
+        Err(Failure::Interrupted { .. }) => (String::new(), "interrupted"),
+        Err(_) => (String::new(), "failed"),
+    };
+    let told = progress.end(&text, summary.for_programs(state, &job.folder));
+    outcome.and(told)
 }
 
 fn start_threads(threads: u32) -> Result<(), Failure> {
@@ -128,7 +126,8 @@ impl Job {
     fn opening_facts(&self) -> serde_json::Value {
         let render = &self.scene.render;
         json!({
-            "software": SOFTWARE, "scene": self.scene_path, "out": self.folder,
+            "software": SOFTWARE, "scene": self.scene_path.display().to_string(),
+            "out": self.folder.display().to_string(),
             "frames": self.frames.frames().len(), "kept": self.kept(),
             "width": render.size.0, "height": render.size.1, "samples_per_pixel": render.samples,
             "threads": rayon::current_num_threads(),

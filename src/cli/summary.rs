@@ -129,7 +129,7 @@ impl Summary {
             "outcome": outcome, "rendered": self.rendered, "kept": self.kept,
             "seconds": self.start.elapsed().as_secs_f64(), "stage_seconds": stages,
             "samples": self.samples, "rays": self.rays, "photons": self.photons, "texture_bytes": self.texture_bytes,
-            "peak_memory_bytes": peak_memory_bytes(), "out": folder,
+            "peak_memory_bytes": peak_memory_bytes(), "out": folder.display().to_string(),
         })
     }
 }

@@ -19,8 +19,8 @@ use std::path::{Path, PathBuf};
 pub struct RunFacts {
     /// Name and version of the software.
     pub software: String,
-    /// The scene file, its includes and assets, in the order of reading.
-    pub scene_files: Vec<PathBuf>,
+    /// The scene file, its includes and assets, in the order of reading; U+FFFD stands for what is not Unicode.
+    pub scene_files: Vec<String>,
     /// XXH3-128 over those files, 32 hexadecimal digits.
     pub scene_hash: String,
     /// The camera entity.
@@ -40,7 +40,7 @@ impl RunFacts {
     pub fn new(scene: &SceneDescription, overrides: &[String], threads: usize) -> Self {
         Self {
             software: SOFTWARE.to_owned(),
-            scene_files: scene.files.clone(),
+            scene_files: scene.files.iter().map(|path| path.display().to_string()).collect(),
             scene_hash: format!("{:032x}", scene.content_hash),
             camera: scene.camera.clone(),
             clock: scene.clock,
