@@ -64,7 +64,7 @@ fn next_frame(c: &mut Criterion) {
             b.iter_custom(|frames| {
                 let mut spent = Duration::ZERO;
                 for frame in 0..frames {
-                    world.resource_mut::<FrameClock>().frame = frame as u32 % 48;
+                    world.resource_mut::<FrameClock>().frame = frame as i32 % 48;
                     sample_shutter(world);
                     let start = Instant::now();
                     stage.run(black_box(world));

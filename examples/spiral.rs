@@ -112,8 +112,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for number in 0..FRAMES {
         let frame = simulation.render_frame(number, &RenderControl::default())?;
         let files = FrameFiles::new(&folder, "spiral", number);
-        write_png(&files.png, &frame.film, &settings)?;
         let facts = FrameMetadata::of_world(simulation.world(), &frame);
+        write_png(&files.png, &frame.film, &settings, &facts)?;
         write_exr(&files.exr, &frame.film, &settings, &facts)?;
         println!("{}", files.png.display());
     }

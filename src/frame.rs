@@ -21,6 +21,7 @@ use bevy_ecs::schedule::{
 use bevy_ecs::system::ScheduleSystem;
 use serde::Serialize;
 use std::collections::TryReserveError;
+use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicU64};
@@ -50,13 +51,40 @@ pub struct RenderControl {
     pub samples_total: Arc<AtomicU64>,
     /// Rays traced in the current frame.
     pub rays: Arc<AtomicU64>,
+    /// Hears of the integrator before light is simulated.
+    pub on_method: MethodListener,
+}
+
+/// What is called in every frame, before light is simulated, with the integrator that runs, why, and what is
+/// out of its reach. Nothing by default.
+#[derive(Clone, Default)]
+pub struct MethodListener(Option<Arc<dyn Fn(&ChosenIntegrator) + Send + Sync>>);
+
+impl MethodListener {
+    /// One which calls this.
+    pub fn new(listen: impl Fn(&ChosenIntegrator) + Send + Sync + 'static) -> Self {
+        Self(Some(Arc::new(listen)))
+    }
+}
+
+impl fmt::Debug for MethodListener {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "MethodListener(..)" } else { "MethodListener(none)" })
+    }
+}
+
+/// Tells who listens which integrator runs.
+fn tell_method(control: Res<RenderControl>, chosen: Res<ChosenIntegrator>) {
+    if let Some(listen) = &control.on_method.0 {
+        listen(&chosen);
+    }
 }
 
 /// What happened in a frame: times, counts, warnings. Goes into the manifest.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct FrameReport {
     /// The frame.
-    pub frame: u32,
+    pub frame: i32,
     /// Seconds spent in each stage, in order: `step`, `extract`, `build`, `integrate`.
     pub stage_seconds: Vec<(&'static str, f64)>,
     /// Seconds spent in each system, in order: `poses` of the first stage; `camera`, `surfaces`,
@@ -251,7 +279,7 @@ impl Simulation {
     ///
     /// # Errors
     /// When there is no camera, a reference dangles or the clock cannot run.
-    pub fn prepare_frame(&mut self, frame: u32) -> Result<(), RenderError> {
+    pub fn prepare_frame(&mut self, frame: i32) -> Result<(), RenderError> {
         let control = RenderControl::default();
         control.cancel.store(true, Relaxed);
         match self.run(frame, &control) {
@@ -270,13 +298,13 @@ impl Simulation {
     /// or there is no memory for the film.
     pub fn render_frame(
         &mut self,
-        frame: u32,
+        frame: i32,
         control: &RenderControl,
     ) -> Result<RenderedFrame, RenderError> {
         self.run(frame, control)
     }
 
-    fn run(&mut self, frame: u32, control: &RenderControl) -> Result<RenderedFrame, RenderError> {
+    fn run(&mut self, frame: i32, control: &RenderControl) -> Result<RenderedFrame, RenderError> {
         self.check_clock()?;
         if self.world.query::<&Camera>().iter(&self.world).next().is_none() {
             return Err(RenderError::NoCamera);
@@ -535,6 +563,7 @@ fn frame_schedule(world: &mut World) -> Schedule {
     for set in [Marks::Opening, Marks::Stepped, Marks::Extracted, Marks::Built, Marks::Integrated] {
         frame.add_systems(mark.in_set(set));
     }
+    frame.add_systems(tell_method.in_set(Marks::Built));
     step::install(world, &mut frame);
     extract::install(world, &mut frame);
     build::install(world, &mut frame);

@@ -98,8 +98,8 @@
 //!
 //! let folder = tempfile::tempdir()?;
 //! let files = FrameFiles::new(folder.path(), "pendulum", 5);
-//! write_png(&files.png, &frame.film, &settings)?;
 //! let facts = FrameMetadata::of_world(simulation.world(), &frame);
+//! write_png(&files.png, &frame.film, &settings, &facts)?;
 //! write_exr(&files.exr, &frame.film, &settings, &facts)?;
 //! assert!(files.png.exists() && files.exr.exists());
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -1,8 +1,9 @@
 //! The program from outside: exit codes, files, going on after an interruption.
 
 use std::fs;
+use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 const SCENE: &str = r#"
 Scene(
@@ -67,6 +68,48 @@ fn help_and_version_succeed_and_misuse_is_code_2() {
 }
 
 #[test]
+fn a_scene_without_a_command_is_answered_with_the_command() {
+    let folder = folder();
+    fs::write(folder.path().join("a.ron"), SCENE).expect("writable");
+    for words in [&["a.ron"][..], &["a.ron", "-f", "3"], &["-s", "4", "a.ron"]] {
+        let output = kinora(folder.path(), words);
+        assert_eq!(output.status.code(), Some(2), "{words:?}");
+        let meant = format!("did you mean: kinora render {}\n", words.join(" "));
+        assert!(stderr(&output).ends_with(&meant), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn short_options_stand_for_the_long_ones() {
+    let folder = folder();
+    let long = ["--frames", "1", "--samples", "3", "--threads", "1", "--out", "long"];
+    let short = ["-f1", "-s", "3", "-j1", "-o", "short"];
+    for options in [&long[..], &short] {
+        fs::write(folder.path().join("a.ron"), SCENE).expect("writable");
+        let arguments = [&["render", "a.ron", "--size", "8x8"], options].concat();
+        assert_eq!(kinora(folder.path(), &arguments).status.code(), Some(0));
+    }
+    let read = |path: &str| fs::read(folder.path().join(path)).expect("was written");
+    assert!(read("long/a.0001.exr") == read("short/a.0001.exr"));
+}
+
+/// Roff begins with its title line; the page of a command has that command's options.
+#[test]
+fn the_manual_and_the_completions_are_printed() {
+    let folder = folder();
+    let printed = |words: &[&str]| {
+        let output = kinora(folder.path(), words);
+        assert_eq!(output.status.code(), Some(0), "{words:?}: {}", stderr(&output));
+        String::from_utf8(output.stdout).expect("UTF-8")
+    };
+    assert!(printed(&["man"]).contains(".TH kinora 1"));
+    let page = printed(&["man", "render"]);
+    assert!(page.contains(".TH kinora-render 1") && page.contains("threads"), "{page}");
+    assert!(printed(&["completions", "bash"]).contains("--threads"));
+    assert_eq!(kinora(folder.path(), &["man", "paint"]).status.code(), Some(2));
+}
+
+#[test]
 fn a_missing_scene_is_code_1_and_leaves_no_folder() {
     let folder = folder();
     for command in ["render", "check"] {
@@ -84,6 +127,44 @@ fn an_output_folder_that_cannot_be_is_code_74() {
     let output = render(folder.path(), &["--out", "file/deep"]);
     assert_eq!(output.status.code(), Some(74));
     assert!(stderr(&output).contains("file/deep"), "{}", stderr(&output));
+}
+
+/// The scene names a file which lies in the folder where the program runs.
+#[test]
+fn a_scene_may_come_from_the_standard_input() {
+    let folder = folder();
+    fs::write(folder.path().join("part.ron"), SCENE).expect("writable");
+    let run = |arguments: &[&str], text: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kinora"));
+        command.current_dir(folder.path()).args(arguments);
+        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("the program starts");
+        let mut stdin = child.stdin.take().expect("it is piped");
+        stdin.write_all(text.as_bytes()).expect("the program reads");
+        drop(stdin);
+        child.wait_with_output().expect("it ends")
+    };
+    let scene = r#"(include: ["part.ron"], render: (size: (8, 8), samples: 2))"#;
+    let output = run(&["render", "-", "-f", "-1"], scene);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let out = folder.path().join("out/stdin");
+    assert_eq!(names_in(&out), ["manifest.json", "stdin.-0001.exr", "stdin.-0001.png"]);
+    assert_eq!(run(&["check", "-"], scene).status.code(), Some(0));
+    let output = run(&["check", "-"], "(include: 3)");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("<stdin>:1:11"), "{}", stderr(&output));
+}
+
+#[test]
+fn frames_before_time_0_are_rendered_and_resumed() {
+    let folder = folder();
+    let made = |frames| rendered_and_developed(folder.path(), &["--frames", frames]);
+    assert_eq!(made("-2-0").0, [-2, -1, 0]);
+    assert_eq!(made("-3--1").0, [-3]);
+    let bytes = fs::read(folder.path().join("out/a/manifest.json")).expect("was written");
+    let record: serde_json::Value = serde_json::from_slice(&bytes).expect("is JSON");
+    let frames = record["frames"].as_array().expect("a list").iter();
+    assert_eq!(frames.map(|f| f["frame"].as_i64()).collect::<Vec<_>>(), [-3, -2, -1, 0].map(Some));
 }
 
 #[test]
@@ -104,30 +185,134 @@ fn a_render_leaves_exactly_its_frames_and_the_record() {
     assert_eq!(record["settings"]["size"], serde_json::json!([8, 8]));
 }
 
+/// Runs as `render` does, and tells which frames were rendered and how many only developed.
+fn rendered_and_developed(folder: &Path, more: &[&str]) -> (Vec<i64>, u64) {
+    let output = render(folder, &[&["--progress", "json"], more].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    let events: Vec<serde_json::Value> =
+        text.lines().map(|line| serde_json::from_str(line).expect("one object a line")).collect();
+    let frames = events.iter().filter(|event| event["event"] == "frame");
+    let frames = frames.map(|event| event["frame"].as_i64().expect("number")).collect();
+    let end = events.last().expect("the end is told");
+    (frames, end["developed"].as_u64().expect("number"))
+}
+
 #[test]
-fn only_what_is_missing_or_damaged_is_rendered_again() {
+fn only_what_is_missing_or_damaged_is_made_again() {
     let folder = folder();
     let out = folder.path().join("out/a");
-    let rendered = |more: &[&str]| {
-        let output =
-            render(folder.path(), &[&["--frames", "0-3", "--progress", "json"], more].concat());
-        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        let text = String::from_utf8(output.stdout).expect("UTF-8");
-        let events = text.lines().map(|line| {
-            serde_json::from_str::<serde_json::Value>(line).expect("one object a line")
-        });
-        let frames = events.filter(|e| e["event"] == "frame");
-        frames.map(|e| e["frame"].as_u64().expect("number")).collect::<Vec<_>>()
+    let made = |more: &[&str]| {
+        rendered_and_developed(folder.path(), &[&["--frames", "0-3"], more].concat())
     };
-    assert_eq!(rendered(&[]), [0, 1, 2, 3]);
-    let whole = fs::read(out.join("a.0002.exr")).expect("was written");
-    assert_eq!(rendered(&[]), [0_u64; 0]);
-    fs::write(out.join("a.0002.exr"), &whole[..whole.len() / 2]).expect("writable");
-    fs::remove_file(out.join("a.0000.png")).expect("was written");
-    assert_eq!(rendered(&[]), [0, 2]);
-    assert_eq!(fs::read(out.join("a.0002.exr")).expect("was written"), whole, "to the byte");
-    assert_eq!(rendered(&["--seed", "5"]), [0, 1, 2, 3]);
-    assert_eq!(rendered(&["--seed", "5", "--fresh"]), [0, 1, 2, 3]);
+    assert_eq!(made(&[]), (vec![0, 1, 2, 3], 0));
+    let files = ["a.0002.exr", "a.0000.png"];
+    let whole = files.map(|name| fs::read(out.join(name)).expect("was written"));
+    assert_eq!(made(&[]), (vec![], 0));
+    fs::write(out.join(files[0]), &whole[0][..whole[0].len() / 2]).expect("writable");
+    fs::remove_file(out.join(files[1])).expect("was written");
+    assert_eq!(made(&[]), (vec![2], 1));
+    let again = files.map(|name| fs::read(out.join(name)).expect("was written"));
+    assert!(again == whole, "to the byte");
+    assert_eq!(made(&["--seed", "5"]), (vec![0, 1, 2, 3], 0));
+    assert_eq!(made(&["--seed", "5", "--fresh"]), (vec![0, 1, 2, 3], 0));
+}
+
+/// Both from the command line and in the file, for an EXR of 32 and of 16 bits: the PNG is what a
+/// render with these settings would have made, to the byte.
+#[test]
+fn another_exposure_or_tone_curve_renders_nothing() {
+    for bits in ["render.exr_bits=32", "render.exr_bits=16"] {
+        let folder = folder();
+        let read = |path: &str| fs::read(folder.path().join(path)).expect("was written");
+        let made = |more: &[&str]| {
+            rendered_and_developed(
+                folder.path(),
+                &[&["--frames", "0-1", "--set", bits], more].concat(),
+            )
+        };
+        let agx = ["--set", "render.tonemap=Agx", "--set", "render.exposure=1.5"];
+        assert_eq!(made(&[]).0, [0, 1]);
+        let (exr, png) = (read("out/a/a.0001.exr"), read("out/a/a.0001.png"));
+        assert_eq!(made(&agx), (vec![], 2));
+        assert_eq!(made(&agx), (vec![], 0));
+        assert!(read("out/a/a.0001.exr") == exr);
+        assert_eq!(made(&[&agx[..], &["--out", "fresh"]].concat()).0, [0, 1]);
+        assert!(
+            read("out/a/a.0001.png") == read("fresh/a.0001.png") && png != read("fresh/a.0001.png")
+        );
+    }
+}
+
+#[test]
+fn settings_in_the_file_count_as_those_of_the_command_line() {
+    let folder = folder();
+    let run = |settings: &str| {
+        let scene = SCENE.replacen("(", &format!("({settings}, "), 1);
+        fs::write(folder.path().join("b.ron"), scene).expect("writable");
+        let arguments = ["render", "b.ron", "--progress", "json"];
+        let output = kinora(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        String::from_utf8_lossy(&output.stdout).matches("\"event\":\"frame\"").count()
+    };
+    let first = "render: (size: (8, 8), samples: 2), clock: (frames: (0, 1))";
+    assert_eq!(run(first), 2);
+    assert_eq!(run(&first.replace("samples: 2", "samples: 2, tonemap: Agx /* less red */")), 0);
+    assert_eq!(run(&first.replace("(0, 1)", "(0, 2)")), 1);
+    assert_eq!(run(&first.replace("samples: 2", "samples: 3")), 2);
+}
+
+#[test]
+fn a_folder_is_developed_again() {
+    let folder = folder();
+    let read = |path: &str| fs::read(folder.path().join(path)).expect("was written");
+    assert_eq!(render(folder.path(), &["--frames", "0-2"]).status.code(), Some(0));
+    let sure = |arguments: &[&str]| {
+        let output = kinora(folder.path(), &[&["develop"], arguments].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    };
+    sure(&["out/a", "--set", "render.tonemap=Agx"]);
+    // What is not named stays as it is.
+    sure(&["out/a/a.0000.exr", "out/a/a.0002.exr", "--set", "render.exposure=1.5"]);
+    sure(&["out/a/a.0001.exr", "--set", "render.exposure=1.5", "--out", "there"]);
+    let agx = ["--set", "render.tonemap=Agx", "--set", "render.exposure=1.5", "--out", "fresh"];
+    render(folder.path(), &[&["--frames", "0-2"], &agx[..]].concat());
+    for (developed, rendered) in [
+        ("out/a/a.0000.png", "fresh/a.0000.png"),
+        ("out/a/a.0002.png", "fresh/a.0002.png"),
+        ("there/a.0001.png", "fresh/a.0001.png"),
+    ] {
+        assert!(read(developed) == read(rendered), "{developed}");
+    }
+    assert!(read("out/a/a.0001.png") != read("fresh/a.0001.png"));
+}
+
+#[test]
+fn what_cannot_be_developed_is_told() {
+    let folder = folder();
+    render(folder.path(), &["--frames", "0-1"]);
+    fs::create_dir(folder.path().join("empty")).expect("writable");
+    for (arguments, code, words) in [
+        (&["nowhere"][..], 1, &["nowhere"][..]),
+        (&["empty"], 1, &["no EXR file in `empty`", "kinora render"]),
+        (&["a.ron"], 1, &["cannot read a picture from `a.ron`"]),
+        (&["out/a", "--set", "render.samples=8"], 2, &["render.samples", "render.tonemap"]),
+        (&["out/a", "--set", "render.tonemap=Agfx"], 1, &["Agfx", "Agx"]),
+        (&["out/a", "--set", "render.exposure=99"], 1, &["render.exposure", "60"]),
+        (&["out/a", "out/a/a.0001.exr"], 2, &["a.0001.png"]),
+    ] {
+        let output = kinora(folder.path(), &[&["develop"], arguments].concat());
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", stderr(&output));
+        let told = stderr(&output);
+        assert!(words.iter().all(|word| told.contains(word)), "{arguments:?}: {told}");
+    }
+    // One broken file does not keep the others.
+    fs::write(folder.path().join("out/a/a.0000.exr"), "broken").expect("writable");
+    fs::remove_file(folder.path().join("out/a/a.0001.png")).expect("was written");
+    let output = kinora(folder.path(), &["develop", "out/a"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("a.0000.exr") && stderr(&output).contains("1 PNG developed"));
+    assert!(folder.path().join("out/a/a.0001.png").exists());
 }
 
 #[test]
@@ -260,7 +445,7 @@ fn a_termination_signal_ends_with_code_75_and_nothing_torn() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_kinora"))
         .current_dir(folder.path())
         .args(["render", "a.ron", "--frames", "0-99", "--size", "256x256", "--samples", "1000"])
-        .stderr(std::process::Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
     let manifest = folder.path().join("out/a/manifest.json");

@@ -48,7 +48,7 @@ fn everything() -> SceneDescription {
     description
 }
 
-fn frame(simulation: &mut Simulation, frame: u32) -> Picture {
+fn frame(simulation: &mut Simulation, frame: i32) -> Picture {
     let frame = simulation.render_frame(frame, &RenderControl::default());
     let frame = frame.unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(frame.report.non_finite, 0);

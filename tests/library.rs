@@ -46,7 +46,7 @@ fn studio() -> Simulation {
     simulation
 }
 
-fn render(simulation: &mut Simulation, frame: u32) -> Picture {
+fn render(simulation: &mut Simulation, frame: i32) -> Picture {
     let frame = simulation.render_frame(frame, &RenderControl::default());
     let frame = frame.unwrap_or_else(|error| panic!("{error}"));
     Picture { film: frame.film, report: frame.report }

@@ -221,7 +221,7 @@ fn photons_and_paths_see_the_same_clouds() {
 /// they are the mean over the way.
 #[test]
 fn clouds_drift_with_time() {
-    let picture = |density: &str, shutter: &str, frame: u32| {
+    let picture = |density: &str, shutter: &str, frame: i32| {
         let text = in_fog(
             "max_depth: 1",
             "attenuation: (color: (0.3, 0.3, 0.3))",

@@ -85,7 +85,7 @@ fn the_table_holds_the_surface_of_each_frame() {
 #[test]
 fn only_the_mesh_that_deforms_is_built_anew() {
     let mut simulation = pool();
-    let mut rebuilt = |frame: u32| {
+    let mut rebuilt = |frame: i32| {
         let rendered = simulation.render_frame(frame, &RenderControl::default());
         let report = rendered.expect("it can be rendered").report;
         (

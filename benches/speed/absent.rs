@@ -37,7 +37,7 @@ fn render(
         return Err(String::from_utf8_lossy(&finished.stderr).into());
     }
     let spent = children_seconds().ok_or("no time")? - before;
-    let frame: u32 = frame.parse()?;
+    let frame: i32 = frame.parse()?;
     Ok((spent, std::fs::read(out.join(format!("{name}.{frame:04}.png")))?))
 }
 

@@ -2,6 +2,7 @@
 
 use super::frames::FrameList;
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
+use clap_complete::Shell;
 use kinora::description::IntegratorChoice;
 use std::path::PathBuf;
 
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 Examples:
   kinora check scenes/ball.ron                     is the scene right, and what will it cost?
   kinora render scenes/ball.ron                    all its frames, into out/ball/
-  kinora render scenes/ball.ron --frames 12 --samples 16 --size 320x240
+  kinora render scenes/ball.ron -f 12 -s 16 --size 320x240
                                                    one small, quick frame to look at
 
 `kinora render --help` explains every option.",
@@ -23,7 +24,7 @@ Examples:
 Examples:
   kinora check scenes/ball.ron                     is the scene right, and what will it cost?
   kinora render scenes/ball.ron                    all its frames, into out/ball/
-  kinora render scenes/ball.ron --frames 12 --samples 16 --size 320x240
+  kinora render scenes/ball.ron -f 12 -s 16 --size 320x240
                                                    one small, quick frame to look at
 
 Exit codes:
@@ -43,6 +44,9 @@ pub struct Arguments {
 pub enum Command {
     Render(RenderArguments),
     Check(CheckArguments),
+    Develop(DevelopArguments),
+    Completions(CompletionsArguments),
+    Man(ManArguments),
 }
 
 /// Render the frames of a scene to EXR and PNG files
@@ -53,6 +57,7 @@ pub enum Command {
 ///
 /// Frames that are there already, whole and rendered from the same scene with the same settings,
 /// are kept. So after an interruption (Ctrl-C) the same command goes on where it stopped.
+/// Another exposure or tone curve renders nothing: the PNG is developed again from the EXR.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
@@ -69,12 +74,13 @@ pub struct RenderArguments {
 
     /// Which frames: 5, 0-47, 0-99:3 (every third), or 9,10,15-20 [default: the scene's]
     ///
-    /// They are rendered in the order given. Frames outside the scene's own range are allowed.
-    #[arg(long, value_name = "LIST")]
+    /// They are rendered in the order given. Frames outside the scene's own range are allowed, also
+    /// those before time 0: -5, -12--1.
+    #[arg(short = 'f', long, value_name = "LIST", allow_hyphen_values = true)]
     pub frames: Option<FrameList>,
 
     /// Folder for the files; made if missing [default: out/NAME, NAME as the scene file]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short = 'o', long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 
     /// Render all frames again, even those that are there already
@@ -84,7 +90,7 @@ pub struct RenderArguments {
     /// Threads that render [default: one per processor]
     ///
     /// The picture does not depend on it, not by a single bit.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=4096))]
+    #[arg(short = 'j', long, value_name = "N", value_parser = value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
 
     /// How progress is shown
@@ -102,10 +108,60 @@ pub struct CheckArguments {
     pub scene: SceneArguments,
 }
 
+/// Develop PNG files again from EXR files, with another exposure or tone curve
+///
+/// Nothing is rendered: each NAME.NNNN.exr becomes NAME.NNNN.png beside it. What --set does not
+/// name stays as the PNG there was developed, or else at exposure 0 and tone curve Srgb.
+#[derive(Debug, Args)]
+#[command(
+    verbatim_doc_comment,
+    after_long_help = "\
+Examples:
+  kinora develop out/ball --set render.tonemap=Agx
+  kinora develop out/ball/ball.0012.exr --set render.exposure=1.5 --out out/bright"
+)]
+pub struct DevelopArguments {
+    /// EXR files, or folders of them
+    #[arg(value_name = "PATH", required = true)]
+    pub paths: Vec<PathBuf>,
+
+    /// What to change: `render.exposure=1` (stops), `render.tonemap=Agx` (Srgb, Agx, Aces, Reinhard)
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
+    pub overrides: Vec<String>,
+
+    /// Folder for the PNG files; made if missing [default: beside the EXR files]
+    #[arg(short = 'o', long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Print what lets a shell complete commands, options and their values
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Examples:
+  source <(kinora completions bash)
+  kinora completions zsh > ~/.zfunc/_kinora
+  kinora completions fish > ~/.config/fish/completions/kinora.fish")]
+pub struct CompletionsArguments {
+    /// The shell
+    pub shell: Shell,
+}
+
+/// Print the manual page of kinora, or of one of its commands
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Examples:
+  kinora man | man -l -
+  kinora man render > /usr/local/share/man/man1/kinora-render.1")]
+pub struct ManArguments {
+    /// The command [default: the program as a whole]
+    #[arg(value_name = "COMMAND")]
+    pub command: Option<String>,
+}
+
 /// The scene, and what the command line changes in it.
 #[derive(Debug, Args)]
 pub struct SceneArguments {
-    /// The scene file, such as scenes/ball.ron
+    /// The scene file, such as scenes/ball.ron, or - for the standard input
     #[arg(value_name = "SCENE")]
     pub path: PathBuf,
 
@@ -114,7 +170,7 @@ pub struct SceneArguments {
     pub size: Option<(u32, u32)>,
 
     /// Samples per pixel; four times as many halve the noise [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    #[arg(short = 's', long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub samples: Option<u32>,
 
     /// How light is simulated [default: the scene's]
@@ -230,7 +286,7 @@ mod tests {
     /// Terminals of 100 columns show the help without broken lines.
     #[test]
     fn help_fits_in_a_hundred_columns() {
-        for name in ["render", "check"] {
+        for name in ["render", "check", "develop", "completions", "man"] {
             let mut command = Arguments::command();
             let text =
                 command.find_subcommand_mut(name).expect("exists").render_long_help().to_string();

@@ -33,7 +33,7 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
 
 /// What the renderer has to do for this scene, each with its reason, and which integrator does it.
 fn requirements(survey: &Survey) -> Vec<(&'static str, String)> {
-    let frames: Vec<String> = survey.frames.iter().map(u32::to_string).collect();
+    let frames: Vec<String> = survey.frames.iter().map(i32::to_string).collect();
     let seen = match frames.as_slice() {
         [frame] => format!("(seen at frame {frame})"),
         [rest @ .., last] => format!("(seen at frames {} and {last})", rest.join(", ")),
@@ -61,7 +61,7 @@ fn contents(scene: &SceneDescription) -> Vec<(&'static str, String)> {
         (
             "frames",
             format!(
-                "{} ({first}-{last}) at {} per second, shutter {open} to {close} of a frame",
+                "{} ({first} to {last}) at {} per second, shutter {open} to {close} of a frame",
                 frame_count(scene),
                 scene.clock.fps
             ),
@@ -100,7 +100,7 @@ fn cost(scene: &SceneDescription) -> Vec<(&'static str, String)> {
 
 fn frame_count(scene: &SceneDescription) -> u64 {
     let (first, last) = scene.clock.frames;
-    (u64::from(last) + 1).saturating_sub(u64::from(first))
+    u64::try_from(i64::from(last) + 1 - i64::from(first)).unwrap_or(0)
 }
 
 fn camera(scene: &SceneDescription) -> String {

@@ -2,8 +2,11 @@
 
 use super::arguments::SceneArguments;
 use super::failure::Failure;
-use kinora::description::{IntegratorChoice, LoadOptions, SceneDescription, load_scene};
+use kinora::description::{
+    IntegratorChoice, LoadOptions, SceneDescription, load_scene, read_scene,
+};
 use kinora::frame::{RenderControl, RenderError, RenderedFrame, Simulation};
+use std::path::Path;
 
 /// Loads and checks the scene together with what the command line changes in it.
 pub fn load(arguments: &SceneArguments) -> Result<SceneDescription, Failure> {
@@ -13,10 +16,16 @@ pub fn load(arguments: &SceneArguments) -> Result<SceneDescription, Failure> {
         overrides: overrides(arguments),
         camera: arguments.camera.clone(),
     };
-    load_scene(&arguments.path, &options).map_err(|diagnostics| Failure::Diagnostics {
-        plain: diagnostics.render(false),
-        styled: diagnostics.render(true),
-    })
+    if is_stdin(&arguments.path) {
+        let here = Some(Path::new("."));
+        return Ok(read_scene("<stdin>", std::io::stdin().lock(), here, &options)?);
+    }
+    Ok(load_scene(&arguments.path, &options)?)
+}
+
+/// Whether a scene is to come from the standard input.
+pub fn is_stdin(path: &Path) -> bool {
+    path == Path::new("-")
 }
 
 /// The options which stand for a setting, and then those of `--set`, as paths and values: all go
@@ -32,9 +41,13 @@ fn overrides(arguments: &SceneArguments) -> Vec<(String, String)> {
         ),
     ];
     let named = named.into_iter().filter_map(|(path, value)| Some((path.to_owned(), value?)));
-    let set = arguments.overrides.iter().filter_map(|set| set.split_once('='));
-    let set = set.map(|(path, value)| (path.trim().to_owned(), value.trim().to_owned()));
-    named.chain(set).collect()
+    named.chain(split_overrides(&arguments.overrides)).collect()
+}
+
+/// The values of `--set` as paths and values.
+pub fn split_overrides(overrides: &[String]) -> Vec<(String, String)> {
+    let set = overrides.iter().filter_map(|set| set.split_once('='));
+    set.map(|(path, value)| (path.trim().to_owned(), value.trim().to_owned())).collect()
 }
 
 /// A scene ready to render.
@@ -48,7 +61,7 @@ impl Engine {
     /// Renders a frame; `None` when the control has cancelled it.
     pub fn render_frame(
         &mut self,
-        frame: u32,
+        frame: i32,
         control: &RenderControl,
     ) -> Result<Option<RenderedFrame>, Failure> {
         match self.0.render_frame(frame, control) {

@@ -1,6 +1,7 @@
 //! What can go wrong in a command, and the exit code that says so.
 
 use super::progress::say;
+use kinora::description::Diagnostics;
 use kinora::output::OutputError;
 use std::error::Error;
 use std::io::{self, IsTerminal};
@@ -28,6 +29,9 @@ pub enum Failure {
     Scene(#[source] Box<dyn Error + Send + Sync>),
     #[error("{0}")]
     Usage(String),
+    /// A file that was named cannot be used.
+    #[error("{0}")]
+    Input(String),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("cannot write to the standard output")]
@@ -39,11 +43,21 @@ pub enum Failure {
     Interrupted { finished: usize, total: usize, folder: PathBuf },
 }
 
+impl From<Diagnostics> for Failure {
+    fn from(diagnostics: Diagnostics) -> Self {
+        let (plain, styled) = (diagnostics.render(false), diagnostics.render(true));
+        Self::Diagnostics { plain, styled }
+    }
+}
+
 impl Failure {
     /// What the program returns to the shell.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Diagnostics { .. } | Self::Scene(_) => SCENE,
+            Self::Diagnostics { .. }
+            | Self::Scene(_)
+            | Self::Input(_)
+            | Self::Output(OutputError::Read { .. } | OutputError::TooLarge { .. }) => SCENE,
             Self::Usage(_) => USAGE,
             // A reader that has seen enough, such as `head`, is no failure.
             Self::Stdout(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,

@@ -1,4 +1,4 @@
-//! Lists of frames as they are typed: `5`, `0-47`, `0-99:3`, `9,10,15-20`.
+//! Lists of frames as they are typed: `5`, `0-47`, `0-99:3`, `9,10,15-20`, `-12--1`.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// Frames in the order in which they are to be rendered, each once.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FrameList(Vec<u32>);
+pub struct FrameList(Vec<i32>);
 
 /// The most frames of one run; beyond it a mistyped digit is likelier than a film of eleven hours.
 const LIMIT: usize = 1_000_000;
@@ -26,11 +26,11 @@ pub enum FrameListError {
 
 impl FrameList {
     /// All frames from the first to the last, both included.
-    pub fn from_range(first: u32, last: u32) -> Result<Self, FrameListError> {
+    pub fn from_range(first: i32, last: i32) -> Result<Self, FrameListError> {
         format!("{first}-{last}").parse()
     }
 
-    pub fn frames(&self) -> &[u32] {
+    pub fn frames(&self) -> &[i32] {
         &self.0
     }
 }
@@ -42,9 +42,9 @@ impl FromStr for FrameList {
         let (mut frames, mut seen) = (Vec::new(), HashSet::new());
         for item in text.split(',') {
             let (range, step) = parse_item(item.trim())?;
-            // u64, for a range up to the last u32 ends beyond it.
+            // i64, for a range up to the last i32 ends beyond it.
             for frame in range.step_by(step) {
-                let frame = frame as u32;
+                let frame = frame as i32;
                 if seen.insert(frame) {
                     frames.push(frame);
                 }
@@ -57,32 +57,34 @@ impl FromStr for FrameList {
     }
 }
 
-fn parse_item(item: &str) -> Result<(Range<u64>, usize), FrameListError> {
+fn parse_item(item: &str) -> Result<(Range<i64>, usize), FrameListError> {
     let wrong = || FrameListError::Item(item.to_owned());
-    let number = |text: &str| text.trim().parse::<u32>().map_err(|_| wrong());
     let (range, step) = match item.split_once(':') {
-        Some((range, step)) => (range, number(step)?),
-        None => (item, 1),
+        Some((range, step)) => (range, Some(step.trim().parse::<u32>().map_err(|_| wrong())?)),
+        None => (item, None),
     };
-    let (first, last) = match range.split_once('-') {
-        Some((first, last)) => (number(first)?, number(last)?),
-        None if step == 1 && !item.contains(':') => (number(range)?, number(range)?),
+    let number = |text: &str| text.trim().parse::<i32>().map_err(|_| wrong());
+    // A minus sign in front belongs to the first number.
+    let between = range.char_indices().skip(1).find(|&(_, letter)| letter == '-');
+    let (first, last) = match between {
+        Some((at, _)) => (number(&range[..at])?, number(&range[at + 1..])?),
+        None if step.is_none() => (number(range)?, number(range)?),
         None => return Err(wrong()),
     };
     if first > last {
         return Err(FrameListError::Backwards(item.to_owned()));
     }
-    if step == 0 {
+    if step == Some(0) {
         return Err(FrameListError::Step(item.to_owned()));
     }
-    Ok((u64::from(first)..u64::from(last) + 1, step as usize))
+    Ok((i64::from(first)..i64::from(last) + 1, step.unwrap_or(1) as usize))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn frames(text: &str) -> Result<Vec<u32>, FrameListError> {
+    fn frames(text: &str) -> Result<Vec<i32>, FrameListError> {
         text.parse::<FrameList>().map(|list| list.0)
     }
 
@@ -93,7 +95,16 @@ mod tests {
         assert_eq!(frames("7-7"), Ok(vec![7]));
         assert_eq!(frames("0-10:3"), Ok(vec![0, 3, 6, 9]));
         assert_eq!(frames("9, 10,1-3"), Ok(vec![9, 10, 1, 2, 3]));
-        assert_eq!(frames("4294967294-4294967295"), Ok(vec![u32::MAX - 1, u32::MAX]));
+        assert_eq!(frames("2147483646-2147483647"), Ok(vec![i32::MAX - 1, i32::MAX]));
+    }
+
+    #[test]
+    fn a_minus_sign_belongs_to_the_number_behind_it() {
+        assert_eq!(frames("-5"), Ok(vec![-5]));
+        assert_eq!(frames("-2-1"), Ok(vec![-2, -1, 0, 1]));
+        assert_eq!(frames("-5--3, -10--4:3"), Ok(vec![-5, -4, -3, -10, -7]));
+        assert_eq!(frames("-2147483648"), Ok(vec![i32::MIN]));
+        assert!(matches!(frames("-3--5"), Err(FrameListError::Backwards(_))));
     }
 
     #[test]
@@ -103,11 +114,13 @@ mod tests {
 
     #[test]
     fn mistakes_are_named() {
-        for wrong in ["", ",", "a", "1-", "-1", "1--2", "5:2", "1-2-3", "1.5", "1,", "4294967296"] {
+        for wrong in
+            ["", ",", "a", "1-", "-", "--1", "1---2", "5:2", "1-2-3", "1.5", "1,", "2147483648"]
+        {
             assert!(matches!(frames(wrong), Err(FrameListError::Item(_))), "{wrong}");
         }
         assert!(matches!(frames("9-3"), Err(FrameListError::Backwards(_))));
         assert!(matches!(frames("0-9:0"), Err(FrameListError::Step(_))));
-        assert_eq!(frames("0-4294967295"), Err(FrameListError::TooMany));
+        assert_eq!(frames("0-2147483647"), Err(FrameListError::TooMany));
     }
 }

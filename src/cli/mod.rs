@@ -2,10 +2,12 @@
 
 mod arguments;
 mod check;
+mod develop;
 mod engine;
 mod failure;
 mod format;
 mod frames;
+mod help;
 mod interrupt;
 mod progress;
 mod render;
@@ -14,21 +16,35 @@ mod survey;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
-use failure::{Failure, INTERNAL};
+use failure::{Failure, INTERNAL, USAGE};
 use progress::say;
+use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::process::ExitCode;
 
 /// Runs the command that was typed and answers with its exit code.
 pub fn main() -> ExitCode {
     std::panic::set_hook(Box::new(report_panic));
-    let arguments = match Arguments::try_parse() {
+    let words: Vec<OsString> = std::env::args_os().collect();
+    let arguments = match Arguments::try_parse_from(&words) {
         Ok(arguments) => arguments,
-        Err(answer) => return print_answer(&answer),
+        Err(answer) => {
+            let meant = help::meant(words.get(1..).unwrap_or_default());
+            return match meant.filter(|_| answer.use_stderr()) {
+                Some(meant) => {
+                    say(&format!("error: no command was given\n\n  did you mean: {meant}"));
+                    ExitCode::from(USAGE)
+                }
+                None => print_answer(&answer),
+            };
+        }
     };
     let outcome = catch_unwind(AssertUnwindSafe(|| match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Develop(arguments) => develop::run(&arguments),
+        Command::Completions(arguments) => help::completions(&arguments),
+        Command::Man(arguments) => help::man(&arguments),
     }));
     match outcome {
         Ok(Ok(())) => ExitCode::SUCCESS,

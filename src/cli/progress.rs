@@ -7,7 +7,8 @@ use super::arguments::ProgressForm;
 use super::failure::Failure;
 use super::format;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use kinora::frame::RenderControl;
+use kinora::extract::ChosenIntegrator;
+use kinora::frame::{MethodListener, RenderControl};
 use kinora::output::FrameEntry;
 use serde_json::{Value, json};
 use std::collections::HashSet;
@@ -20,10 +21,21 @@ use std::time::{Duration, Instant};
 /// Tells the user how far the render is.
 pub struct Progress {
     view: View,
-    told: HashSet<String>,
+    told: Told,
     done: usize,
     pending: usize,
     watcher: Option<Watcher>,
+}
+
+/// What was told already: it is not told again.
+#[derive(Clone, Default)]
+struct Told(Arc<Mutex<HashSet<String>>>);
+
+impl Told {
+    /// Whether this is new.
+    fn add(&self, text: &str) -> bool {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(text.to_owned())
+    }
 }
 
 /// Where and how it is told.
@@ -64,7 +76,7 @@ impl Progress {
             View::Lines | View::None => None,
         };
         let watcher = watcher.map(|(every, view)| Watcher::start(every, view, control.clone()));
-        Self { view, told: HashSet::new(), done: 0, pending, watcher }
+        Self { view, told: Told::default(), done: 0, pending, watcher }
     }
 
     /// What is about to happen: `text` for people, `facts` for programs.
@@ -77,7 +89,7 @@ impl Progress {
         }
     }
 
-    pub fn frame_started(&self, frame: u32) {
+    pub fn frame_started(&self, frame: i32) {
         if let Some(watcher) = &self.watcher {
             watcher.shared.set(Watched::Frame { frame, index: self.done, since: Instant::now() });
         }
@@ -113,18 +125,29 @@ impl Progress {
     }
 
     /// Something the user should know; the same words are told once.
-    pub fn warn(&mut self, text: &str) {
-        if !self.told.insert(text.to_owned()) {
-            return;
-        }
-        // Excerpts of a scene are labelled already.
-        let label = if text.starts_with("warning") { "" } else { "warning: " };
-        match &self.view {
-            View::Bars(bars) => bars.print(&format!("{label}{text}")),
-            View::Lines => say(&format!("{label}{text}")),
-            View::Json(events) => events.send("warning", json!({ "text": text })),
-            View::None => {}
-        }
+    pub fn warn(&self, text: &str) {
+        warn(&self.view, &self.told, text);
+    }
+
+    /// Tells which integrator runs and why, and what is out of its reach: before the first frame, and again
+    /// where it changes.
+    pub fn method_listener(&self) -> MethodListener {
+        let (view, told) = (self.view.clone(), self.told.clone());
+        MethodListener::new(move |chosen| {
+            let text = format!("integrator: {}", method_in_words(chosen));
+            if told.add(&text) {
+                match &view {
+                    View::Bars(bars) => bars.print(&text),
+                    View::Lines => say(&text),
+                    View::Json(events) => events.send(
+                        "integrator",
+                        json!({ "name": chosen.method.name(), "reason": chosen.reason }),
+                    ),
+                    View::None => {}
+                }
+            }
+            chosen.warnings.iter().for_each(|warning| warn(&view, &told, warning));
+        })
     }
 
     /// The end: takes the bars away; `text` for people, `facts` for programs.
@@ -145,6 +168,28 @@ impl Progress {
             _ => {}
         }
         Ok(())
+    }
+}
+
+/// `Path (Auto takes it: nothing casts caustics)`.
+fn method_in_words(chosen: &ChosenIntegrator) -> String {
+    match chosen.reason {
+        None => format!("{} (as the settings say)", chosen.method.name()),
+        Some(_) => chosen.description(),
+    }
+}
+
+fn warn(view: &View, told: &Told, text: &str) {
+    if !told.add(text) {
+        return;
+    }
+    // Excerpts of a scene are labelled already.
+    let label = if text.starts_with("warning") { "" } else { "warning: " };
+    match view {
+        View::Bars(bars) => bars.print(&format!("{label}{text}")),
+        View::Lines => say(&format!("{label}{text}")),
+        View::Json(events) => events.send("warning", json!({ "text": text })),
+        View::None => {}
     }
 }
 
@@ -227,13 +272,13 @@ fn time_left(elapsed: Duration, share: f64) -> String {
 /// What the watcher looks at.
 enum Watched {
     Idle,
-    Frame { frame: u32, index: usize, since: Instant },
+    Frame { frame: i32, index: usize, since: Instant },
     End,
 }
 
 /// The counters at one moment.
 struct Snapshot {
-    frame: u32,
+    frame: i32,
     index: usize,
     elapsed: Duration,
     samples_done: u64,

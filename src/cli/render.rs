@@ -12,11 +12,12 @@ use super::survey::scene_warnings;
 use kinora::description::SceneDescription;
 use kinora::frame::{RenderControl, RenderedFrame};
 use kinora::output::{
-    FrameEntry, FrameFiles, FrameMetadata, JobFingerprint, Manifest, RunFacts, SOFTWARE,
-    check_writable, frame_is_complete, peak_memory_bytes, write_exr, write_png,
+    FrameEntry, FrameFiles, FrameMetadata, FrameState, JobFingerprint, Manifest, RunFacts,
+    SOFTWARE, check_writable, develop_exr, frame_state, peak_memory_bytes, write_exr, write_png,
 };
 use rayon::prelude::*;
 use serde_json::json;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -28,7 +29,9 @@ struct Job {
     /// All frames that were asked for.
     frames: FrameList,
     /// Those of them which are not on disk yet.
-    pending: Vec<u32>,
+    pending: Vec<i32>,
+    /// Those of them which are rendered, and whose PNG is missing or developed otherwise.
+    undeveloped: Vec<i32>,
     folder: PathBuf,
     /// The stem of the scene file, and so of the pictures.
     name: String,
@@ -42,18 +45,20 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     if let Some(threads) = arguments.threads {
         start_threads(threads)?;
     }
-    let job = Job::new(arguments, control)?;
+    let mut job = Job::new(arguments, control)?;
     let facts = RunFacts::new(&job.scene, &arguments.scene.overrides, rayon::current_num_threads());
     let mut manifest = Manifest::open(&job.folder, facts, &job.fingerprint);
     manifest.save()?;
 
-    let mut summary = Summary::new(job.kept());
+    let mut summary = Summary::new(job.kept(), job.undeveloped.len());
     let mut progress = Progress::new(arguments.progress, &job.control, job.pending.len());
+    job.control.on_method = progress.method_listener();
     progress.start(&job.opening(), job.opening_facts());
     for warning in scene_warnings(&job.scene, false) {
         progress.warn(&warning);
     }
-    let outcome = job.render_pending(&mut manifest, &mut progress, &mut summary);
+    let outcome =
+        job.develop().and_then(|()| job.render_pending(&mut manifest, &mut progress, &mut summary));
     for warning in summary.warnings() {
         progress.warn(&warning);
     }
@@ -77,7 +82,10 @@ impl Job {
     fn new(arguments: &RenderArguments, control: RenderControl) -> Result<Self, Failure> {
         let scene = engine::load(&arguments.scene)?;
         let scene_path = arguments.scene.path.clone();
-        let stem = scene_path.file_stem().unwrap_or(scene_path.as_os_str());
+        let stem = match scene_path.file_stem() {
+            _ if engine::is_stdin(&scene_path) => OsStr::new("stdin"),
+            stem => stem.unwrap_or(scene_path.as_os_str()),
+        };
         let name = stem.to_string_lossy().into_owned();
         let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(stem));
         check_writable(&folder)?;
@@ -89,12 +97,30 @@ impl Job {
             )?,
         };
         let fingerprint = JobFingerprint::new(&scene);
-        let is_pending = |&frame: &u32| {
-            arguments.fresh
-                || !frame_is_complete(&folder, &name, frame, fingerprint.of_frame(frame))
+        let state = |&frame: &i32| {
+            if arguments.fresh {
+                return FrameState::Missing;
+            }
+            let files = FrameFiles::new(&folder, &name, frame);
+            frame_state(&files, fingerprint.of_frame(frame), scene.render.development())
         };
-        let pending = frames.frames().par_iter().copied().filter(is_pending).collect();
-        Ok(Self { scene, scene_path, frames, pending, folder, name, fingerprint, control })
+        let states: Vec<FrameState> = frames.frames().par_iter().map(state).collect();
+        let those = |wanted: FrameState| {
+            let all = frames.frames().iter().zip(&states);
+            all.filter(|&(_, &state)| state == wanted).map(|(&frame, _)| frame).collect()
+        };
+        let (pending, undeveloped) = (those(FrameState::Missing), those(FrameState::Undeveloped));
+        Ok(Self {
+            scene,
+            scene_path,
+            frames,
+            pending,
+            undeveloped,
+            folder,
+            name,
+            fingerprint,
+            control,
+        })
     }
 
     /// How many frames were found finished.
@@ -120,6 +146,11 @@ impl Job {
             text.push_str(&which);
             text.push_str(" are there already and are kept (--fresh renders them again)");
         }
+        if !self.undeveloped.is_empty() {
+            text.push('\n');
+            text.push_str(&format::plural(self.undeveloped.len(), "PNG"));
+            text.push_str(" of them developed again from the EXR");
+        }
         text
     }
 
@@ -129,8 +160,16 @@ impl Job {
             "software": SOFTWARE, "scene": self.scene_path.display().to_string(),
             "out": self.folder.display().to_string(),
             "frames": self.frames.frames().len(), "kept": self.kept(),
-            "width": render.size.0, "height": render.size.1, "samples_per_pixel": render.samples,
+            "developed": self.undeveloped.len(), "width": render.size.0, "height": render.size.1, "samples_per_pixel": render.samples,
             "threads": rayon::current_num_threads(),
+        })
+    }
+
+    /// Develops what only has another exposure or tone curve, or lost its PNG.
+    fn develop(&self) -> Result<(), Failure> {
+        self.undeveloped.par_iter().try_for_each(|&frame| {
+            let files = FrameFiles::new(&self.folder, &self.name, frame);
+            Ok(develop_exr(&files.exr, &files.png, self.scene.render.development())?)
         })
     }
 
@@ -175,7 +214,7 @@ impl Job {
     /// Puts a frame on disk, and tells how long it took since `start`.
     fn write(
         &self,
-        frame: u32,
+        frame: i32,
         rendered: RenderedFrame,
         start: Instant,
     ) -> Result<FrameEntry, Failure> {
@@ -193,7 +232,7 @@ impl Job {
         let finished = Instant::now();
         // The larger file first: on a full disk nothing of the frame remains.
         let saturated = write_exr(&files.exr, &film, settings, &metadata)?;
-        write_png(&files.png, &film, settings)?;
+        write_png(&files.png, &film, settings, &metadata)?;
         Ok(FrameEntry {
             frame,
             fingerprint,

@@ -19,15 +19,19 @@ pub struct Summary {
     saturated: u64,
     /// Most bytes of images in a frame.
     texture_bytes: u64,
+    /// The integrators that ran and why, each with the first frame of which this is told.
+    integrators: Vec<(i32, String)>,
     /// What the photons of all frames came to.
     photons: Option<PhotonReport>,
     /// Frames rendered by this run, and frames found finished.
     pub rendered: usize,
     pub kept: usize,
+    /// Kept frames whose PNG was developed again.
+    developed: usize,
 }
 
 impl Summary {
-    pub fn new(kept: usize) -> Self {
+    pub fn new(kept: usize, developed: usize) -> Self {
         Self {
             start: Instant::now(),
             stages: Vec::new(),
@@ -36,9 +40,11 @@ impl Summary {
             non_finite: 0,
             saturated: 0,
             texture_bytes: 0,
+            integrators: Vec::new(),
             photons: None,
             rendered: 0,
             kept,
+            developed,
         }
     }
 
@@ -48,6 +54,10 @@ impl Summary {
         self.rays += entry.report.rays;
         self.non_finite += entry.report.non_finite;
         self.saturated += entry.saturated;
+        let integrator = &entry.report.integrator;
+        if !self.integrators.iter().any(|(_, known)| known == integrator) {
+            self.integrators.push((entry.frame, integrator.clone()));
+        }
         let textures = entry.report.table_bytes.iter().find(|(name, _)| *name == "textures");
         self.texture_bytes = self.texture_bytes.max(textures.map_or(0, |(_, bytes)| *bytes));
         if let Some(photons) = &entry.report.photons {
@@ -85,11 +95,12 @@ impl Summary {
 
     pub fn for_people(&self, folder: &Path) -> String {
         if self.rendered == 0 {
-            return format!(
-                "nothing to render: {} in {}",
-                format::plural(self.kept, "frame"),
-                folder.display()
-            );
+            let frames = format::plural(self.kept, "frame");
+            let developed = match self.developed {
+                0 => String::new(),
+                count => format!(", {} developed again", format::plural(count, "PNG")),
+            };
+            return format!("nothing to render: {frames} in {}{developed}", folder.display());
         }
         let seconds = self.start.elapsed();
         let frames = format::plural(self.rendered, "frame");
@@ -102,6 +113,7 @@ impl Summary {
         };
         let stages: Vec<_> = self.stages.iter().map(stage).collect();
         lines.push(format!("  time     {}", stages.join(", ")));
+        lines.push(format!("  light    {}", self.integrators()));
         lines.push(format!("  samples  {}", format::count(self.samples as f64)));
         lines.push(format!(
             "  rays     {} ({} rays/s)",
@@ -122,12 +134,25 @@ impl Summary {
         lines.join("\n")
     }
 
+    /// What lighted the frames; where it changed, from which frame on.
+    fn integrators(&self) -> String {
+        match self.integrators.as_slice() {
+            [(_, only)] => only.clone(),
+            several => {
+                let each =
+                    several.iter().map(|(frame, text)| format!("{text} (from frame {frame})"));
+                each.collect::<Vec<_>>().join("; ")
+            }
+        }
+    }
+
     pub fn for_programs(&self, outcome: &str, folder: &Path) -> Value {
         let stages: serde_json::Map<_, _> =
             self.stages.iter().map(|&(name, seconds)| (name.to_owned(), seconds.into())).collect();
         json!({
-            "outcome": outcome, "rendered": self.rendered, "kept": self.kept,
+            "outcome": outcome, "rendered": self.rendered, "kept": self.kept, "developed": self.developed,
             "seconds": self.start.elapsed().as_secs_f64(), "stage_seconds": stages,
+            "integrators": self.integrators.iter().map(|(_, text)| text).collect::<Vec<_>>(),
             "samples": self.samples, "rays": self.rays, "photons": self.photons, "texture_bytes": self.texture_bytes,
             "peak_memory_bytes": peak_memory_bytes(), "out": folder.display().to_string(),
         })

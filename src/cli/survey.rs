@@ -10,7 +10,7 @@ use kinora::world::{Name, Views};
 /// What was found at the frames looked at.
 pub struct Survey {
     /// The first frame, the middle one and the last: what happens only between them is not seen.
-    pub frames: Vec<u32>,
+    pub frames: Vec<i32>,
     /// Each feature once, in words, and what asks for it.
     pub features: Vec<(String, String)>,
     /// The integrator that will run, and why.
@@ -60,7 +60,7 @@ fn diced(simulation: &mut Simulation) -> Vec<(String, usize, usize)> {
 
 /// Each feature once, with its first reason, and with the frame where it is not required at all of
 /// them.
-fn union(frames: &[u32], found: Vec<(u32, String, String)>) -> Vec<(String, String)> {
+fn union(frames: &[i32], found: Vec<(i32, String, String)>) -> Vec<(String, String)> {
     let mut union: Vec<(String, String)> = Vec::new();
     for (frame, feature, reason) in &found {
         if union.iter().any(|(known, _)| known == feature) {

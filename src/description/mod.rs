@@ -29,9 +29,11 @@ pub use motion::{
 };
 pub use photons::{Caustics, DirectLight, Kernel, PhotonSettings};
 pub use profile::{Curve, CurveError};
-pub use read::{LoadOptions, load_scene, parse_scene_str};
+pub use read::{LoadOptions, load_scene, parse_scene_str, read_scene};
 pub use scene::{Displacement, EntityDescription, Relief, SceneDescription};
-pub use settings::{BvhQuality, Clock, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap};
+pub use settings::{
+    BvhQuality, Clock, Development, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap,
+};
 pub use shape::{Shape, TriangleMesh};
 pub use spectrum::SpectrumData;
 pub use texture::{

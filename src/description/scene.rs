@@ -42,8 +42,8 @@ pub enum Relief {
 pub struct SceneDescription {
     /// The scene file and everything it includes and names, in the order of reading.
     pub files: Vec<PathBuf>,
-    /// XXH3-128 over the bytes and names of all those files, and over what was set from outside except
-    /// for the clock and the settings of the render.
+    /// XXH3-128 over the bytes and names of all those files, and over what was set from outside: in both
+    /// without the clock and the settings of the render.
     pub content_hash: u128,
     /// What is probably not meant: definitions which nothing uses, a scene without light.
     pub warnings: Diagnostics,

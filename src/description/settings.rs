@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 pub struct Clock {
     /// Frames per second.
     pub fps: f64,
-    /// First and last frame, both included.
-    pub frames: (u32, u32),
+    /// First and last frame, both included; frames before time 0 have negative numbers.
+    pub frames: (i32, i32),
     /// When the shutter opens and closes, in fractions of a frame after the frame's time; 0.5 is
     /// film's 180°.
     pub shutter: (f64, f64),
@@ -114,6 +114,29 @@ impl Default for RenderSettings {
             layers: vec![Layer::Beauty],
             exr_bits: 32,
         }
+    }
+}
+
+/// How the linear picture becomes the PNG: all that may change without rendering anything again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Development {
+    /// In stops.
+    pub exposure: f32,
+    /// The tone curve.
+    pub tonemap: ToneMap,
+}
+
+impl RenderSettings {
+    /// What of the settings concerns the PNG alone.
+    pub fn development(&self) -> Development {
+        Development { exposure: self.exposure, tonemap: self.tonemap }
+    }
+
+    /// The settings as far as they decide what is rendered: the same for every development.
+    #[must_use]
+    pub fn without_development(&self) -> Self {
+        let Development { exposure, tonemap } = Development::default();
+        Self { exposure, tonemap, ..self.clone() }
     }
 }
 

@@ -51,6 +51,7 @@ impl IntegrateStatus {
 pub(super) struct Job<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) filter: FilterSampler,
+    /// The frame, as the key of its random numbers.
     pub(super) frame: u32,
     /// Whether anything depends on the time in the shutter.
     pub(super) has_time: bool,
@@ -92,7 +93,7 @@ pub fn render_film(
     let Some(mut film) = status.begin(settings, &control) else { return };
     let scene = tables.view();
     let requires = |feature| scene.requirements.has(feature);
-    let job = Job::new(settings, &scene, clock.frame, &control);
+    let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);
     let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
     let counters = match (requires(Feature::Opacity), Around::new(scene.requirements)) {
         (false, Around::Clear) => fill(&mut film, &begin.tracer::<false, Clear>(), &job),

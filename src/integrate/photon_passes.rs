@@ -132,7 +132,7 @@ pub fn render_film_with_photons(
     let settings = &settings.0;
     let Some(mut film) = status.begin(settings, &control) else { return };
     let scene = tables.view();
-    let job = Job::new(settings, &scene, clock.frame, &control);
+    let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);
     let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
     let setting = Setting::new(&scene, &job, chosen.method, &source);
     let scratch = &mut *scratch;

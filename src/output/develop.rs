@@ -1,13 +1,31 @@
 //! The developed picture: exposure, tone curve, 8-bit sRGB codes.
+//!
+//! A PNG says that it is sRGB, how it was developed, and from which frame: one text chunk `kinora` holds
+//! a JSON object of [`PngFacts`]. So a run can tell whether a picture is as it would be developed now.
 
-use super::{OutputError, write_atomically};
+use super::picture::Picture;
+use super::{Fingerprint, FrameMetadata, OutputError, SOFTWARE, read_metadata, write_atomically};
 use crate::color::{exposure_factor, srgb, tone};
-use crate::description::{RenderSettings, Rgb, ToneMap};
+use crate::description::{Development, RenderSettings, Rgb, ToneMap};
 use crate::film::Film;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
+
+/// The text chunk with our facts.
+const KEYWORD: &str = "kinora";
+
+/// What a PNG tells about itself.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PngFacts {
+    /// That of the EXR from which it was developed, if that has one.
+    pub fingerprint: Option<Fingerprint>,
+    /// How it was developed.
+    #[serde(flatten)]
+    pub development: Development,
+}
 
 /// Turns linear radiance into 8-bit sRGB codes.
 ///
@@ -25,28 +43,80 @@ pub fn develop(radiance: Rgb, exposure: f32, tonemap: ToneMap) -> [u8; 3] {
     }
 }
 
-/// Writes the developed picture of a film as an 8-bit PNG.
+/// Writes the developed picture of a film as an 8-bit PNG: what [`develop_exr`] would make of its EXR.
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_png(path: &Path, film: &Film, settings: &RenderSettings) -> Result<(), OutputError> {
-    let (width, height) = film.size();
-    let row = |y| {
-        (0..width)
-            .flat_map(move |x| develop(film.radiance(x, y), settings.exposure, settings.tonemap))
-    };
-    let codes: Vec<u8> = (0..height).into_par_iter().flat_map_iter(row).collect();
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
-        .write_image(&codes, width, height, ExtendedColorType::Rgb8)
+pub fn write_png(
+    path: &Path,
+    film: &Film,
+    settings: &RenderSettings,
+    metadata: &FrameMetadata,
+) -> Result<(), OutputError> {
+    let (fingerprint, development) = (Some(metadata.fingerprint), settings.development());
+    write_picture(path, &Picture::of_film(film, settings), PngFacts { fingerprint, development })
+}
+
+/// Writes the PNG of a frame anew, from its EXR.
+///
+/// # Errors
+/// When the EXR cannot be read or has no colours, or when the PNG cannot be written.
+pub fn develop_exr(exr: &Path, png: &Path, development: Development) -> Result<(), OutputError> {
+    let picture = Picture::read(exr)?;
+    let metadata =
+        read_metadata(exr).map_err(|source| OutputError::Read { path: exr.to_owned(), source })?;
+    let fingerprint = metadata.map(|metadata| metadata.fingerprint);
+    write_picture(png, &picture, PngFacts { fingerprint, development })
+}
+
+fn write_picture(path: &Path, picture: &Picture, facts: PngFacts) -> Result<(), OutputError> {
+    let Development { exposure, tonemap } = facts.development;
+    let codes: Vec<u8> = picture
+        .radiance
+        .par_iter()
+        .flat_map_iter(|&radiance| develop(radiance, exposure, tonemap))
+        .collect();
+    let facts = serde_json::to_string(&facts).map_err(|source| OutputError::Json { source })?;
+    let bytes = encode(picture.size, &codes, facts)
         .map_err(|source| OutputError::Png { path: path.to_owned(), source })?;
     write_atomically(path, &bytes)
+}
+
+fn encode(
+    (width, height): (u32, u32),
+    codes: &[u8],
+    facts: String,
+) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Balanced);
+    encoder.set_filter(png::Filter::Adaptive);
+    // The tone curve has fitted the picture to the screen already: whatever is still out of its gamut is
+    // to be clipped alone.
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    encoder.add_text_chunk("Software".to_owned(), SOFTWARE.to_owned())?;
+    encoder.add_text_chunk(KEYWORD.to_owned(), facts)?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(codes)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// Reads what a PNG tells about itself; `None` where the file cannot be read or is not ours.
+pub fn read_png_facts(path: &Path) -> Option<PngFacts> {
+    let reader = png::Decoder::new(BufReader::new(File::open(path).ok()?)).read_info().ok()?;
+    let mut texts = reader.info().uncompressed_latin1_text.iter();
+    let text = &texts.find(|chunk| chunk.keyword == KEYWORD)?.text;
+    serde_json::from_str(text).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::film::PixelSample;
+    use crate::output::exr_file::tests::metadata;
 
     #[test]
     fn exposure_and_curve_are_applied_before_the_codes() {
@@ -59,10 +129,8 @@ mod tests {
         assert_eq!(develop(Rgb::ONE, 0.0, ToneMap::Aces), [232; 3]); // 255·encode(0.8038) = 231.6
     }
 
-    #[test]
-    fn a_png_holds_the_codes_of_its_pixels() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let path = folder.path().join("ramp.png");
+    /// Two rows over all codes of red.
+    fn ramp() -> Film {
         let mut film = Film::new((256, 2), &[]).expect("small");
         for tile in film.tiles() {
             let mut buffer = film.tile_buffer(tile);
@@ -74,11 +142,35 @@ mod tests {
             }
             film.merge(buffer);
         }
-        write_png(&path, &film, &RenderSettings::default()).expect("writable");
+        film
+    }
+
+    #[test]
+    fn a_png_holds_the_codes_of_its_pixels() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("ramp.png");
+        write_png(&path, &ramp(), &RenderSettings::default(), &metadata(5)).expect("writable");
         let picture = image::open(&path).expect("just written").into_rgb8();
         assert_eq!(picture.dimensions(), (256, 2));
         for (x, y, pixel) in picture.enumerate_pixels() {
             assert_eq!(pixel.0, [x as u8, 0, y as u8 * 255]);
         }
+    }
+
+    /// The chunk `sRGB` (PNG, 3rd ed., section 11.3.2.5) holds one byte, the intent.
+    #[test]
+    fn a_png_says_that_it_is_srgb_and_how_it_was_developed() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("ramp.png");
+        let settings =
+            RenderSettings { exposure: -1.5, tonemap: ToneMap::Agx, ..Default::default() };
+        write_png(&path, &ramp(), &settings, &metadata(5)).expect("writable");
+        let bytes = std::fs::read(&path).expect("just written");
+        assert!(bytes.windows(9).any(|part| part == b"\0\0\0\x01sRGB\x01"));
+        let fingerprint = Some(Fingerprint(5));
+        let development = settings.development();
+        assert_eq!(read_png_facts(&path), Some(PngFacts { fingerprint, development }));
+        std::fs::write(&path, &bytes[..60]).expect("writable");
+        assert_eq!(read_png_facts(&path), None);
     }
 }

@@ -5,6 +5,7 @@
 //! byte for byte. Standard attributes carry what they can: `software`, `worldToCamera`,
 //! `framesPerSecond`, `chromaticities`. Text is UTF-8, as OpenEXR has it since its version 2.0.
 
+use super::picture::to_half;
 use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
 use crate::color::CHROMATICITIES;
 use crate::description::{Layer, RenderSettings, SceneDescription};
@@ -34,7 +35,7 @@ pub struct FrameMetadata {
     /// Of everything that decides the pixels.
     pub fingerprint: Fingerprint,
     /// The frame.
-    pub frame: u32,
+    pub frame: i32,
     /// When its shutter opens, in seconds.
     pub time: f64,
     /// Frames per second.
@@ -65,7 +66,7 @@ impl FrameMetadata {
     /// Gathers the facts of a frame.
     pub fn new(
         fingerprint: Fingerprint,
-        frame: u32,
+        frame: i32,
         scene: &SceneDescription,
         integrator: &str,
         world_to_camera: DMat4,
@@ -222,9 +223,7 @@ fn channel(plane: Plane, halves: bool, saturated: &mut u64) -> AnyChannel<FlatSa
         PlaneSamples::F32(values) if halves => {
             let limit = f16::MAX.to_f32();
             *saturated += values.iter().filter(|value| value.abs() > limit).count() as u64;
-            FlatSamples::F16(
-                values.iter().map(|value| f16::from_f32(value.clamp(-limit, limit))).collect(),
-            )
+            FlatSamples::F16(values.into_iter().map(to_half).collect())
         }
         PlaneSamples::F32(values) => FlatSamples::F32(values),
     };

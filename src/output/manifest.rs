@@ -55,7 +55,7 @@ impl RunFacts {
 #[derive(Clone, Debug, Serialize)]
 pub struct FrameEntry {
     /// The frame.
-    pub frame: u32,
+    pub frame: i32,
     /// Of everything that decides its pixels.
     pub fingerprint: Fingerprint,
     /// The names of its files, relative to the manifest.
@@ -87,7 +87,7 @@ impl FrameEntry {
 pub struct Manifest {
     path: PathBuf,
     run: RunFacts,
-    frames: BTreeMap<u32, Value>,
+    frames: BTreeMap<i32, Value>,
 }
 
 impl Manifest {
@@ -104,7 +104,7 @@ impl Manifest {
             .into_iter()
             .flatten()
             .filter_map(|entry| {
-                let frame = u32::try_from(entry.get("frame")?.as_u64()?).ok()?;
+                let frame = i32::try_from(entry.get("frame")?.as_i64()?).ok()?;
                 let fingerprint = entry.get("fingerprint")?.as_str()?;
                 (fingerprint == job.of_frame(frame).to_string()).then(|| (frame, entry.clone()))
             })
@@ -145,7 +145,7 @@ impl Manifest {
 mod tests {
     use super::*;
 
-    fn entry(frame: u32, job: &JobFingerprint) -> FrameEntry {
+    fn entry(frame: i32, job: &JobFingerprint) -> FrameEntry {
         let files = FrameFiles::new(Path::new("out"), "a", frame);
         FrameEntry {
             frame,

@@ -219,7 +219,7 @@ mod tests {
             let (mut world, mut schedule, entity) = pool(ripples(amplitude));
             schedule.run(&mut world);
             assert_eq!(motion(&world, entity).later.is_empty(), !moves);
-            let mut changed = |world: &mut World, frame: u32| {
+            let mut changed = |world: &mut World, frame: i32| {
                 world.clear_trackers();
                 world.resource_mut::<FrameClock>().frame = frame;
                 schedule.run(world);

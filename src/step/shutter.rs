@@ -441,7 +441,7 @@ mod tests {
                 door.translation.x = x;
             }
         }
-        let run = |frames: &[u32]| {
+        let run = |frames: &[i32]| {
             let (mut world, mut schedule) = world_with_shutter(0.5);
             world.schedule_scope(super::super::Pose, |_, poses| {
                 poses.add_systems(knock.in_set(PoseSystems::Custom));
@@ -482,7 +482,7 @@ mod tests {
     /// Frame 7 gives the same keys alone and after the frames before it.
     #[test]
     fn frames_do_not_depend_on_those_before() {
-        let run = |frames: &[u32]| {
+        let run = |frames: &[i32]| {
             let (mut world, mut schedule) = world_with_shutter(0.5);
             let spin = Velocity { linear: DVec3::Y, angular: DVec3::new(0.3, 2.0, 0.1) };
             let parent = world.spawn(spin).id();

@@ -9,7 +9,7 @@ pub struct FrameClock {
     /// Frames, rate and shutter.
     pub clock: Clock,
     /// The frame being made.
-    pub frame: u32,
+    pub frame: i32,
 }
 
 impl FrameClock {
@@ -34,3 +34,16 @@ pub struct SceneTime {
 /// The settings of the render.
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct Settings(pub RenderSettings);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_before_time_0_are_the_same_motion_continued() {
+        let clock = Clock { fps: 24.0, frames: (-24, 24), shutter: (0.0, 0.5) };
+        let shutter = |frame| FrameClock { clock, frame }.shutter();
+        assert_eq!(shutter(-12), (-0.5, -11.5 / 24.0));
+        assert_eq!(shutter(0), (0.0, 0.5 / 24.0));
+    }
+}

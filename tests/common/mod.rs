@@ -21,14 +21,14 @@ pub struct Picture {
 
 /// Renders a frame of a description with the variance layer added; no sample may be non-finite. Pixels
 /// do not share their paths, so that their noise is independent.
-pub fn render_description(description: &SceneDescription, frame: u32) -> Picture {
+pub fn render_description(description: &SceneDescription, frame: i32) -> Picture {
     let mut description = description.clone();
     description.render.share = 1;
     render_as_described(&description, frame)
 }
 
 /// Like [`render_description`], with what the description says of sharing.
-pub fn render_as_described(description: &SceneDescription, frame: u32) -> Picture {
+pub fn render_as_described(description: &SceneDescription, frame: i32) -> Picture {
     let mut description = description.clone();
     if !description.render.layers.contains(&Layer::Variance) {
         description.render.layers.push(Layer::Variance);

@@ -81,7 +81,7 @@ pub(super) const BLADES: Limits = closed(3.0, 64.0, "blades (or 0 for a round ap
 pub(super) const FPS: Limits =
     Limits { min: 0.0, max: 1e9, open_min: true, open_max: false, unit: "frames per second" };
 /// Numbers of frames; they have a place of their own in file names.
-pub(super) const FRAME: Limits = closed(0.0, 99_999_999.0, "");
+pub(super) const FRAME: Limits = closed(-99_999_999.0, 99_999_999.0, "");
 /// When the shutter opens and closes.
 pub(super) const SHUTTER: Limits = closed(-1e6, 1e6, "frames");
 /// Pixels along one side.

@@ -37,6 +37,7 @@ use files::{FileError, MAX_SCENE_BYTES};
 use indexmap::IndexMap;
 use source::{Cursor, Source};
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use xxhash_rust::xxh3::Xxh3;
@@ -69,18 +70,40 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<SceneDescription
     match text {
         Ok(bytes) => {
             loader.files.push(path.to_owned());
+            loader.root = path.canonicalize().ok();
             let hashed = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             loader.read_bytes(&name, &hashed, bytes, dir);
         }
-        Err(error) => loader.report.found.0.push(Diagnostic {
-            severity: Severity::Error,
-            code: error.code(),
-            message: error.to_string(),
-            place: None,
-            label: String::new(),
-            related: Vec::new(),
-            help: None,
-        }),
+        Err(error) => loader.refuse(&error),
+    }
+    loader.finish()
+}
+
+/// Reads and checks a scene which comes from a stream, such as the standard input; files are looked for from
+/// `base_dir`, if there is one.
+///
+/// `name` stands for the file's name in messages.
+///
+/// # Errors
+/// All mistakes which could be found, each with its place. More than 8 MiB are refused.
+pub fn read_scene(
+    name: &str,
+    stream: impl Read,
+    base_dir: Option<&Path>,
+    options: &LoadOptions,
+) -> Result<SceneDescription, Diagnostics> {
+    let mut loader = Loader::new(options);
+    let mut text = Vec::new();
+    // One byte more tells that there is more.
+    let read = stream.take(MAX_SCENE_BYTES + 1).read_to_end(&mut text);
+    let (name, bytes, limit) = (name.to_owned(), text.len() as u64, MAX_SCENE_BYTES);
+    match read {
+        Ok(_) if bytes <= limit => {
+            loader.files.push(PathBuf::from(&name));
+            loader.read_bytes(&name, &name, text, base_dir);
+        }
+        Ok(_) => loader.refuse(&FileError::TooLarge { name, bytes, limit }),
+        Err(source) => loader.refuse(&FileError::Unreadable { name, source }),
     }
     loader.finish()
 }
@@ -137,6 +160,8 @@ struct Loader<'o> {
     /// The files that are being read, outermost first: to find cycles.
     open: Vec<PathBuf>,
     files: Vec<PathBuf>,
+    /// The file that was asked for, if it is one.
+    root: Option<PathBuf>,
     hash: ContentHash,
     complete: bool,
 }
@@ -152,13 +177,26 @@ impl<'o> Loader<'o> {
             sources: Vec::new(),
             open: Vec::new(),
             files: Vec::new(),
+            root: None,
             hash: ContentHash(Xxh3::new()),
             complete: true,
         }
     }
 
+    /// Notes that the scene itself cannot be had.
+    fn refuse(&mut self, error: &FileError) {
+        self.report.found.0.push(Diagnostic {
+            severity: Severity::Error,
+            code: error.code(),
+            message: error.to_string(),
+            place: None,
+            label: String::new(),
+            related: Vec::new(),
+            help: None,
+        });
+    }
+
     fn read_bytes(&mut self, name: &str, hashed: &str, bytes: Vec<u8>, dir: Option<&Path>) {
-        self.hash.add(hashed, &bytes);
         let (text, invalid) = match String::from_utf8(bytes) {
             Ok(text) => (text, None),
             Err(error) => {
@@ -175,6 +213,7 @@ impl<'o> Loader<'o> {
         }
         match Source::new(file.clone(), dir.map(Path::to_owned)) {
             Ok(source) => {
+                self.hash.add(hashed, source.without_settings().as_bytes());
                 self.read_includes(&source);
                 self.sources.push(source);
             }
@@ -216,8 +255,7 @@ impl<'o> Loader<'o> {
 
     /// Reads an included file, unless it has been read; a file that includes itself is an error.
     fn include(&mut self, entry: &Cursor, name: &str, path: PathBuf, bytes: Vec<u8>) {
-        let root = self.files.first().and_then(|root| root.canonicalize().ok());
-        if self.open.contains(&path) || root.as_ref() == Some(&path) {
+        if self.open.contains(&path) || self.root.as_ref() == Some(&path) {
             self.report.at("scene::include", entry, format!("`{name}` includes itself"));
             self.complete = false;
         } else if self.open.len() >= MAX_INCLUDE_DEPTH {

@@ -44,6 +44,19 @@ impl Source {
         Cursor { source: self, key: Span::default(), node: &self.root, path: String::new() }
     }
 
+    /// The text without clock and settings of the render, which tell for themselves what they change.
+    pub(super) fn without_settings(&self) -> String {
+        let (mut rest, mut start) = (String::new(), 0);
+        for entry in &self.root.entries {
+            let key = entry.key.range();
+            if matches!(&self.text[key.clone()], "clock" | "render") {
+                rest.push_str(&self.text[start..key.start]);
+                start = entry.value.span.range().end;
+            }
+        }
+        rest + &self.text[start..]
+    }
+
     /// Where the user wrote what stands at `span` of `text`.
     pub(super) fn place(&self, span: Range<usize>) -> Place {
         let start = self.origin(span.start, false);

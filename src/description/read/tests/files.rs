@@ -51,6 +51,19 @@ fn the_content_hash_covers_all_files() {
     assert_ne!(hash(&first), hash(&folder(&[scene, (eye, &format!("{text} "))])));
 }
 
+/// They tell for themselves what they change.
+#[test]
+fn the_content_hash_leaves_clock_and_settings_out() {
+    let hash = |settings: &str| {
+        let text = format!(r#"({settings} entities: {{"eye": (camera: ())}})"#);
+        let scene = parse_scene_str("a.ron", &text, None, &LoadOptions::default());
+        scene.expect("it is right").content_hash
+    };
+    let plain = hash("render: (samples: 3), clock: (fps: 25),");
+    assert_eq!(hash("render: (/* more */ samples: 4), clock: (frames: (0, 9)),"), plain);
+    assert_ne!(hash(r#"render: (), clock: (), textures: {"t": Gradient()},"#), plain);
+}
+
 #[test]
 fn names_defined_in_two_files_are_told_with_both_places() {
     let folder = folder(&[
