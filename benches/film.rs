@@ -45,6 +45,7 @@ fn pixel_samples() -> Vec<PixelSample> {
         .map(|_| PixelSample {
             radiance: uniforms.cube().abs(),
             first_hit: Some(first_hit(&mut uniforms)),
+            ..PixelSample::default()
         })
         .collect()
 }

@@ -17,7 +17,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-const FRAMES: u32 = 24;
+const FRAMES: i32 = 24;
 const PARTICLES: u32 = 63;
 /// Metres from the foot of the spiral to its top.
 const HEIGHT: f64 = 1.8;

@@ -9,7 +9,7 @@ use crate::extract::{
     ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Requirements,
     Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
-use crate::film::{Film, FilmError};
+use crate::film::{Film, FilmError, Tile};
 use crate::integrate::{IntegrateStatus, PhotonReport};
 use crate::shade::nesting::NestingFaults;
 use crate::world::{Camera, FrameClock, Settings};
@@ -310,8 +310,7 @@ impl Simulation {
             return Err(RenderError::NoCamera);
         }
         let settings = &self.world.resource::<Settings>().0;
-        let pixels = u64::from(settings.size.0) * u64::from(settings.size.1);
-        let total = pixels * u64::from(settings.samples);
+        let total = Tile::rendered(settings).area() as u64 * u64::from(settings.samples);
         control.samples_done.store(0, Relaxed);
         control.samples_total.store(total, Relaxed);
         control.rays.store(0, Relaxed);

@@ -4,6 +4,8 @@ mod common;
 
 use common::{Picture, render, scene};
 use glam::{DVec2, Vec3};
+use kinora::description::Layer;
+use kinora::film::PlaneSamples;
 use std::f64::consts::PI;
 
 /// An emitter alone in the dark, before a camera at the origin which looks along −z.
@@ -291,4 +293,62 @@ fn hidden_lamps_are_seen_by_mirrors_alone() {
         1,
     );
     assert_eq!(render(&text, (2, 2), 4).mean().mean, 1.0);
+}
+
+/// What a scene under an even white sky looks like with this background, by a method.
+fn under_a_sky(method: &str, background: &str) -> Picture {
+    let text = format!(
+        r#"(
+        render: (size: (24, 18), samples: 16, background: {background}, {method}),
+        clock: (shutter: (0, 1)),
+        materials: {{
+            "gray": Diffuse(), "glass": Dielectric(), "net": Masked(material: "gray", opacity: 0.5),
+            "haze": Dielectric(ior: 1, attenuation: Some((color: (0.3, 0.3, 0.3), distance: 1))),
+            "fog": Dielectric(ior: 1, scattering: Some((coefficient: (1, 1, 1)))),
+        }},
+        entities: {{
+            "camera": (transform: (translation: (0, 0, 6)), camera: (fov: 40)),
+            "ball": (transform: (translation: (-1.5, 1, 0)), shape: Sphere(radius: 0.6), material: "gray", velocity: (linear: (20, 0, 0))),
+            "glass": (transform: (translation: (1.3, 1, 0)), shape: Sphere(radius: 0.7), material: "glass"),
+            "net": (transform: (translation: (0, -0.2, 0.5)), shape: Rectangle(size: (1, 0.8)), material: "net"),
+            "haze": (transform: (translation: (-1.2, -0.8, 0)), shape: Sphere(radius: 0.8), material: "haze"),
+            "fog": (transform: (translation: (1.2, -0.9, 0)), shape: Sphere(radius: 0.7), material: "fog"),
+            "sky": (light: Sky(radiance: 2)),
+        }})"#
+    );
+    render(&text, (24, 18), 16)
+}
+
+/// Oracle: A over B = A + (1 − α)·B (Porter and Duff 1984), which for an even sky is that sky seen. It
+/// holds path by path, so that nothing but rounding is left: with motion blur, glass, holes, and media which
+/// absorb or scatter, for all integrators.
+#[test]
+fn a_transparent_background_over_the_sky_is_the_picture_with_the_sky() {
+    for method in [
+        "integrator: Path",
+        "integrator: Path, caustics: Photons",
+        "integrator: Sppm",
+        "integrator: PhotonMap",
+    ] {
+        let (sky, clear) = (under_a_sky(method, "Sky"), under_a_sky(method, "Transparent"));
+        let planes = clear.film.image(Layer::Beauty).expect("always there");
+        assert_eq!(planes.len(), 4, "{method}");
+        let PlaneSamples::F32(alpha) = &planes[3].samples else { panic!("alpha is a number") };
+        for (k, &alpha) in alpha.iter().enumerate() {
+            let (x, y) = (k as u32 % 24, k as u32 / 24);
+            let over = clear.at(x, y) + (1.0 - alpha) * Vec3::splat(2.0);
+            let off = (over - sky.at(x, y)).abs().max_element();
+            assert!(off <= 1e-5, "{method}, ({x}, {y}): {over} instead of {}", sky.at(x, y));
+        }
+        // Corner, glass, net, the middle of the haze: 0.3^1.6.
+        let seen = [(0, 0), (17, 4), (12, 9), (6, 12)].map(|(x, y)| alpha[y * 24 + x]);
+        assert_eq!(seen[..2], [0.0, 1.0], "{method}");
+        assert!((seen[2] - 0.5).abs() < 0.2, "{method}: {seen:?}");
+        assert!((seen[3] - 0.85).abs() < 0.05, "{method}: {seen:?}");
+        assert!(alpha.iter().any(|alpha| (0.1..0.4).contains(alpha)), "{method}: what moves");
+    }
+    assert_eq!(
+        under_a_sky("integrator: Path", "Sky").film.image(Layer::Beauty).map(|p| p.len()),
+        Some(3)
+    );
 }

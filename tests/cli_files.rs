@@ -248,7 +248,7 @@ fn another_exposure_or_tone_curve_renders_nothing() {
 fn settings_in_the_file_count_as_those_of_the_command_line() {
     let folder = folder();
     let run = |settings: &str| {
-        let scene = SCENE.replacen("(", &format!("({settings}, "), 1);
+        let scene = SCENE.replacen('(', &format!("({settings}, "), 1);
         fs::write(folder.path().join("b.ron"), scene).expect("writable");
         let arguments = ["render", "b.ron", "--progress", "json"];
         let output = kinora(folder.path(), &arguments);
@@ -260,6 +260,39 @@ fn settings_in_the_file_count_as_those_of_the_command_line() {
     assert_eq!(run(&first.replace("samples: 2", "samples: 2, tonemap: Agx /* less red */")), 0);
     assert_eq!(run(&first.replace("(0, 1)", "(0, 2)")), 1);
     assert_eq!(run(&first.replace("samples: 2", "samples: 3")), 2);
+}
+
+/// The EXR says where the part lies in the picture, the PNG is as large as the part; going on from one to the
+/// other renders again.
+#[test]
+fn a_region_is_rendered_alone() {
+    let folder = folder();
+    let made = |more: &[&str]| rendered_and_developed(folder.path(), more);
+    let part = ["--region", "2,3,4,5", "--exr-layout", "single", "-o", "part"];
+    assert_eq!(made(&part).0, [0]);
+    assert_eq!(made(&part), (vec![], 0));
+    let whole = ["--exr-layout", "single", "-o", "whole"];
+    assert_eq!(made(&whole).0, [0]);
+    let read = |name: &str| {
+        exr::prelude::read_all_flat_layers_from_file(folder.path().join(name))
+            .expect("just written")
+    };
+    let image = read("part/a.0000.exr");
+    let (display, layer) = (image.attributes.display_window, &image.layer_data[0]);
+    assert_eq!((display.size.0, display.size.1), (8, 8));
+    assert_eq!((layer.size.0, layer.size.1), (4, 5));
+    let corner = layer.attributes.layer_position;
+    assert_eq!((corner.0, corner.1), (2, 3));
+    let png = |name: &str| image::open(folder.path().join(name)).expect("just written").into_rgb8();
+    let (part_png, whole_png) = (png("part/a.0000.png"), png("whole/a.0000.png"));
+    assert_eq!(part_png.dimensions(), (4, 5));
+    for (x, y, pixel) in part_png.enumerate_pixels() {
+        assert_eq!(pixel, whole_png.get_pixel(x + 2, y + 3));
+    }
+    assert_eq!(made(&[&part[..4], &["-o", "whole"]].concat()).0, [0]);
+    let output = render(folder.path(), &["--region", "5,0,4,4"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("8 × 8 pixels"), "{}", stderr(&output));
 }
 
 #[test]

@@ -3,7 +3,8 @@
 mod common;
 
 use common::{Picture, icosphere, mesh_text, scene};
-use kinora::description::{Layer, SceneDescription};
+use kinora::description::{IntegratorChoice, Layer, SceneDescription};
+use kinora::film::{PlaneSamples, Tile};
 use kinora::frame::{RenderControl, Simulation};
 
 /// Something of everything: moving camera and objects, textures, every kind of light, holes, glass
@@ -71,6 +72,57 @@ fn the_number_of_threads_does_not_show() {
     // and the comparison sees a difference where there is one
     let other = frame(&mut Simulation::from_description(&description), 4);
     assert!(!one.same_bits(&other), "another frame is another picture");
+}
+
+/// Pixels share paths in groups, so that those beside a region count as well.
+#[test]
+fn a_region_has_the_bits_of_the_whole_picture() {
+    let mut described = everything();
+    described.render.samples = 3;
+    let still = r#"(
+        render: (samples: 5, size: (70, 40), layers: [Beauty, Normal, Variance]),
+        materials: { "gray": Diffuse(), "glass": Dielectric() },
+        entities: {
+            "camera": (transform: (translation: (0, 1, 6), look_at: (0, 0.7, 0)), camera: (fov: 40)),
+            "floor": (shape: Plane(), material: "gray"),
+            "ball": (transform: (translation: (0, 0.7, 0)), shape: Sphere(radius: 0.7), material: "glass"),
+            "sky": (light: Sky(radiance: 1)),
+        })"#;
+    for (mut described, integrator) in [
+        (described, IntegratorChoice::Path),
+        (scene(still), IntegratorChoice::Path), // shares paths
+        (scene(still), IntegratorChoice::Sppm),
+    ] {
+        described.render.integrator = integrator;
+        let whole = frame(&mut Simulation::from_description(&described), 3);
+        for region in [(0, 0, 1, 1), (29, 17, 8, 19), (69, 39, 1, 1)] {
+            described.render.region = Some(region);
+            let part = frame(&mut Simulation::from_description(&described), 3);
+            let (x0, y0, width, height) = region;
+            assert_eq!((part.film.size(), part.film.window().size()), ((70, 40), (width, height)));
+            // Photons are traced for the whole picture.
+            let fewer = part.report.rays < whole.report.rays / 2;
+            assert!(fewer || integrator == IntegratorChoice::Sppm, "{integrator:?} {region:?}");
+            let Tile { x1, y1, .. } = part.film.window();
+            for (x, y) in (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y))) {
+                assert_eq!(part.at(x, y), whole.at(x, y), "{integrator:?} {region:?}: ({x}, {y})");
+            }
+            let plane = |picture: &Picture| {
+                let planes = picture.film.image(Layer::Normal).expect("asked for");
+                let PlaneSamples::F32(values) = &planes[1].samples else { panic!("numbers") };
+                values.clone()
+            };
+            let (part, whole) = (plane(&part), plane(&whole));
+            for (k, value) in part.iter().enumerate() {
+                let (x, y) = (x0 + k as u32 % width, y0 + k as u32 / width);
+                assert_eq!(
+                    *value,
+                    whole[(y * 70 + x) as usize],
+                    "{region:?}: normal at ({x}, {y})"
+                );
+            }
+        }
+    }
 }
 
 #[test]

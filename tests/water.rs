@@ -105,7 +105,7 @@ fn only_the_mesh_that_deforms_is_built_anew() {
 /// Rendering frame 5 of a sequence gives bit for bit what rendering it alone gives.
 #[test]
 fn a_frame_of_the_sequence_equals_the_frame_alone() {
-    let picture = |frames: &[u32]| {
+    let picture = |frames: &[i32]| {
         let mut simulation = pool();
         let mut last = None;
         for &frame in frames {

@@ -10,7 +10,7 @@ use kinora::frame::Simulation;
 use kinora::world::{Shape, Transform};
 
 /// Moves the first `count` shapes a little, to and fro.
-fn shift(simulation: &mut Simulation, count: usize, frame: i32) {
+fn shift(simulation: &mut Simulation, count: usize, frame: u32) {
     let world = simulation.world_mut();
     let mut shapes = world.query_filtered::<&mut Transform, With<Shape>>();
     let step = if frame.is_multiple_of(2) { 0.01 } else { -0.01 };

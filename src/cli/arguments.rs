@@ -3,7 +3,7 @@
 use super::frames::FrameList;
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
 use clap_complete::Shell;
-use kinora::description::IntegratorChoice;
+use kinora::description::{ExrLayout, IntegratorChoice};
 use std::path::PathBuf;
 
 /// Renders animated scenes into image sequences by simulating light.
@@ -74,9 +74,15 @@ pub struct RenderArguments {
 
     /// Which frames: 5, 0-47, 0-99:3 (every third), or 9,10,15-20 [default: the scene's]
     ///
-    /// They are rendered in the order given. Frames outside the scene's own range are allowed, also
-    /// those before time 0: -5, -12--1.
-    #[arg(short = 'f', long, value_name = "LIST", allow_hyphen_values = true)]
+    /// They are rendered in the order given. Frames outside the scene's own range are allowed, and
+    /// so are those before time 0: -5, -12--1.
+    #[arg(
+        short = 'f',
+        long,
+        verbatim_doc_comment,
+        value_name = "LIST",
+        allow_hyphen_values = true
+    )]
     pub frames: Option<FrameList>,
 
     /// Folder for the files; made if missing [default: out/NAME, NAME as the scene file]
@@ -125,7 +131,7 @@ pub struct DevelopArguments {
     #[arg(value_name = "PATH", required = true)]
     pub paths: Vec<PathBuf>,
 
-    /// What to change: `render.exposure=1` (stops), `render.tonemap=Agx` (Srgb, Agx, Aces, Reinhard)
+    /// What to change: render.exposure (stops), render.tonemap (Srgb, Agx, Aces or Reinhard)
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = parse_override)]
     pub overrides: Vec<String>,
 
@@ -168,6 +174,17 @@ pub struct SceneArguments {
     /// Width and height of the picture in pixels, such as 640x480 [default: the scene's]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
+
+    /// Render a part of the picture alone: left, top, width and height in pixels
+    ///
+    /// Its pixels are those of the whole picture, bit for bit. The EXR has the part as its data
+    /// window, the PNG is as large as the part.
+    #[arg(long, verbatim_doc_comment, value_name = "X,Y,W,H", value_parser = parse_region)]
+    pub region: Option<[u32; 4]>,
+
+    /// Layers of the EXR as parts, or as channels such as albedo.R [default: the scene's]
+    #[arg(long, value_enum, ignore_case = true, value_name = "LAYOUT")]
+    pub exr_layout: Option<LayoutName>,
 
     /// Samples per pixel; four times as many halve the noise [default: the scene's]
     #[arg(short = 's', long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
@@ -239,12 +256,38 @@ impl From<IntegratorName> for IntegratorChoice {
     }
 }
 
+/// [`ExrLayout`] as a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LayoutName {
+    /// One part for each layer
+    Parts,
+    /// One part for all
+    Single,
+}
+
+impl From<LayoutName> for ExrLayout {
+    fn from(name: LayoutName) -> Self {
+        match name {
+            LayoutName::Parts => Self::Parts,
+            LayoutName::Single => Self::Single,
+        }
+    }
+}
+
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once(['x', 'X', '×']);
     let side = |text: &str| text.trim().parse::<u32>().ok().filter(|&pixels| pixels > 0);
     sides
         .and_then(|(width, height)| Some((side(width)?, side(height)?)))
         .ok_or_else(|| "expected width and height in pixels, such as 640x480".to_owned())
+}
+
+fn parse_region(text: &str) -> Result<[u32; 4], String> {
+    let numbers: Vec<u32> = text.split(',').filter_map(|n| n.trim().parse().ok()).collect();
+    let region = <[u32; 4]>::try_from(numbers).ok().filter(|_| text.split(',').count() == 4);
+    region.filter(|region| region[2] > 0 && region[3] > 0).ok_or_else(|| {
+        "expected left, top, width and height in pixels, such as 100,50,64,64".to_owned()
+    })
 }
 
 fn parse_override(text: &str) -> Result<String, String> {
@@ -272,6 +315,14 @@ mod tests {
         assert_eq!(parse_size("1X1"), Ok((1, 1)));
         for wrong in ["", "640", "0x480", "640x0", "-1x5", "640x480x3", "axb", "99999999999x1"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn regions_are_four_numbers_of_which_the_sides_are_positive() {
+        assert_eq!(parse_region("0, 5,64,48"), Ok([0, 5, 64, 48]));
+        for wrong in ["", "1,2,3", "1,2,3,4,5", "1,2,0,4", "1,2,3,0", "-1,2,3,4", "a,2,3,4"] {
+            assert!(parse_region(wrong).is_err(), "{wrong}");
         }
     }
 

@@ -8,6 +8,7 @@ use super::survey::{Survey, scene_warnings};
 use kinora::description::{
     EntityDescription, Light, SceneDescription, SceneTexture, Shape, Texture,
 };
+use kinora::film::Tile;
 use std::collections::HashSet;
 use std::io::{self, IsTerminal, Write};
 use std::sync::Arc;
@@ -86,7 +87,7 @@ fn contents(scene: &SceneDescription) -> Vec<(&'static str, String)> {
 
 /// An honest hint: how much there is to do, not how long it takes.
 fn cost(scene: &SceneDescription) -> Vec<(&'static str, String)> {
-    let (width, height) = scene.render.size;
+    let (width, height) = Tile::rendered(&scene.render).size();
     let paths = f64::from(width) * f64::from(height) * f64::from(scene.render.samples);
     vec![(
         "cost",

@@ -3,7 +3,7 @@
 use super::arguments::SceneArguments;
 use super::failure::Failure;
 use kinora::description::{
-    IntegratorChoice, LoadOptions, SceneDescription, load_scene, read_scene,
+    ExrLayout, IntegratorChoice, LoadOptions, SceneDescription, load_scene, read_scene,
 };
 use kinora::frame::{RenderControl, RenderError, RenderedFrame, Simulation};
 use std::path::Path;
@@ -33,6 +33,13 @@ pub fn is_stdin(path: &Path) -> bool {
 fn overrides(arguments: &SceneArguments) -> Vec<(String, String)> {
     let named = [
         ("render.size", arguments.size.map(|(width, height)| format!("({width}, {height})"))),
+        (
+            "render.region",
+            arguments
+                .region
+                .map(|[x, y, width, height]| format!("Some(({x}, {y}, {width}, {height}))")),
+        ),
+        ("render.exr_layout", arguments.exr_layout.map(|n| format!("{:?}", ExrLayout::from(n)))),
         ("render.samples", arguments.samples.map(|samples| samples.to_string())),
         ("render.seed", arguments.seed.map(|seed| seed.to_string())),
         (

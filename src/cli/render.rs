@@ -9,7 +9,7 @@ use super::interrupt::cancel_on_signal;
 use super::progress::Progress;
 use super::summary::Summary;
 use super::survey::scene_warnings;
-use kinora::description::SceneDescription;
+use kinora::description::{RenderSettings, SceneDescription};
 use kinora::frame::{RenderControl, RenderedFrame};
 use kinora::output::{
     FrameEntry, FrameFiles, FrameMetadata, FrameState, JobFingerprint, Manifest, RunFacts,
@@ -78,6 +78,13 @@ fn start_threads(threads: u32) -> Result<(), Failure> {
         .map_err(|error| Failure::Usage(format!("cannot start {threads} threads: {error}")))
 }
 
+/// Which part of the picture is rendered, if not all of it.
+fn part(render: &RenderSettings) -> String {
+    render.region.map_or_else(String::new, |(x, y, width, height)| {
+        format!(" (of which {width} × {height} from ({x}, {y}) on)")
+    })
+}
+
 impl Job {
     fn new(arguments: &RenderArguments, control: RenderControl) -> Result<Self, Failure> {
         let scene = engine::load(&arguments.scene)?;
@@ -133,10 +140,11 @@ impl Job {
         let (total, kept) = (self.frames.frames().len(), self.kept());
         let scene = self.scene_path.display();
         let mut text = format!(
-            "{SOFTWARE}: {scene}, {} of {} × {} pixels, {} per pixel, {}",
+            "{SOFTWARE}: {scene}, {} of {} × {} pixels{}, {} per pixel, {}",
             format::plural(total, "frame"),
             render.size.0,
             render.size.1,
+            part(render),
             format::plural(render.samples as usize, "sample"),
             format::plural(rayon::current_num_threads(), "thread"),
         );
@@ -160,7 +168,7 @@ impl Job {
             "software": SOFTWARE, "scene": self.scene_path.display().to_string(),
             "out": self.folder.display().to_string(),
             "frames": self.frames.frames().len(), "kept": self.kept(),
-            "developed": self.undeveloped.len(), "width": render.size.0, "height": render.size.1, "samples_per_pixel": render.samples,
+            "developed": self.undeveloped.len(), "width": render.size.0, "height": render.size.1, "region": render.region, "samples_per_pixel": render.samples,
             "threads": rayon::current_num_threads(),
         })
     }

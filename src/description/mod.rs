@@ -32,7 +32,8 @@ pub use profile::{Curve, CurveError};
 pub use read::{LoadOptions, load_scene, parse_scene_str, read_scene};
 pub use scene::{Displacement, EntityDescription, Relief, SceneDescription};
 pub use settings::{
-    BvhQuality, Clock, Development, Filter, IntegratorChoice, Layer, RenderSettings, ToneMap,
+    Background, BvhQuality, Clock, Development, ExrLayout, Filter, IntegratorChoice, Layer,
+    RenderSettings, ToneMap,
 };
 pub use shape::{Shape, TriangleMesh};
 pub use spectrum::SpectrumData;

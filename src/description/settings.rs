@@ -31,6 +31,10 @@ impl Default for Clock {
 pub struct RenderSettings {
     /// Width and height in pixels.
     pub size: (u32, u32),
+    /// The part of the picture that is rendered: left, top, width and height in pixels. `None` is all of it.
+    pub region: Option<(u32, u32, u32, u32)>,
+    /// What the camera sees behind everything.
+    pub background: Background,
     /// Samples per pixel. Trades noise for time: the error falls with the square root.
     pub samples: u32,
     /// Greatest number of surface interactions of a path. Trades the light of longer paths (bias)
@@ -85,12 +89,16 @@ pub struct RenderSettings {
     pub layers: Vec<Layer>,
     /// Bits per channel of the beauty layers in the EXR: 16 or 32.
     pub exr_bits: u32,
+    /// How the EXR holds its layers.
+    pub exr_layout: ExrLayout,
 }
 
 impl Default for RenderSettings {
     fn default() -> Self {
         Self {
             size: (640, 480),
+            region: None,
+            background: Background::default(),
             samples: 64,
             max_depth: 1000,
             roulette_depth: 2,
@@ -113,6 +121,7 @@ impl Default for RenderSettings {
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],
             exr_bits: 32,
+            exr_layout: ExrLayout::default(),
         }
     }
 }
@@ -202,6 +211,26 @@ impl Default for Filter {
     fn default() -> Self {
         Self::Gaussian { sigma: gaussian_sigma(), radius: gaussian_radius() }
     }
+}
+
+/// What the camera's own rays see where they leave the scene without having met anything.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Background {
+    /// Skies and the disks of suns.
+    #[default]
+    Sky,
+    /// Nothing: skies and suns light the scene, are mirrored and refracted, and the picture has an alpha channel.
+    Transparent,
+}
+
+/// How the EXR holds several layers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum ExrLayout {
+    /// One part for each layer, by its name.
+    #[default]
+    Parts,
+    /// All in one part, the channels of all but the beauty as `albedo.R`: for programs that read the first part alone.
+    Single,
 }
 
 /// Tone curves of the PNG.

@@ -2,7 +2,7 @@
 
 use super::{FirstHit, PixelSample, Tile, moments};
 use crate::color::spectrum::WavelengthSet;
-use crate::description::{Layer, Rgb};
+use crate::description::{Background, Layer, RenderSettings, Rgb};
 use glam::{DVec2, DVec3};
 use std::collections::TryReserveError;
 
@@ -25,8 +25,12 @@ pub enum FilmError {
 /// Sums over all samples of all pixels, row by row from the top left.
 #[derive(Clone, Debug)]
 pub struct Film {
-    pub(super) size: (u32, u32),
+    /// Of the picture.
+    size: (u32, u32),
+    /// What of the picture the film holds.
+    window: Tile,
     pub(super) layers: Vec<Layer>,
+    pub(super) alpha: bool,
     pub(super) sums: Sums,
     non_finite: u64,
 }
@@ -46,6 +50,8 @@ pub(super) struct Sums {
     pub count: Vec<u32>,
     /// Mean radiance.
     pub mean: Vec<DVec3>,
+    /// Of the transmittances.
+    pub transmittance: Vec<f64>,
     /// Sum of squared deviations from the mean.
     pub m2: Vec<DVec3>,
     /// Samples whose ray met a surface.
@@ -86,23 +92,45 @@ impl Film {
     /// # Errors
     /// When a side is 0 or the memory cannot be had.
     pub fn new(size: (u32, u32), layers: &[Layer]) -> Result<Self, FilmError> {
-        let (width, height) = size;
+        Self::of_window(size, Tile::whole(size), layers, false)
+    }
+
+    /// An empty film of what the settings ask for: of the whole picture or a part of it, with an alpha channel
+    /// where the background is transparent.
+    ///
+    /// # Errors
+    /// When nothing of the picture is to be rendered or the memory cannot be had.
+    pub fn for_settings(settings: &RenderSettings) -> Result<Self, FilmError> {
+        let alpha = settings.background == Background::Transparent;
+        Self::of_window(settings.size, Tile::rendered(settings), &settings.layers, alpha)
+    }
+
+    fn of_window(
+        size: (u32, u32),
+        window: Tile,
+        layers: &[Layer],
+        alpha: bool,
+    ) -> Result<Self, FilmError> {
+        let (width, height) = window.size();
         if width == 0 || height == 0 {
             return Err(FilmError::Empty { width, height });
         }
-        // Saturation cannot reach the allocator: it turns into its "capacity overflow".
-        let pixels = (width as usize).saturating_mul(height as usize);
-        let sums = Sums::new(pixels, layers).map_err(|source| FilmError::Memory {
+        let sums = Sums::new(window.area(), layers, alpha).map_err(|source| FilmError::Memory {
             width,
             height,
             source,
         })?;
-        Ok(Self { size, layers: layers.to_vec(), sums, non_finite: 0 })
+        Ok(Self { size, window, layers: layers.to_vec(), alpha, sums, non_finite: 0 })
     }
 
-    /// Width and height in pixels.
+    /// Width and height of the picture in pixels.
     pub fn size(&self) -> (u32, u32) {
         self.size
+    }
+
+    /// What of the picture the film holds.
+    pub fn window(&self) -> Tile {
+        self.window
     }
 
     /// Whether any layer needs [`PixelSample::first_hit`].
@@ -110,7 +138,10 @@ impl Film {
         !self.sums.hits.is_empty()
     }
 
-    /// The film cut into tiles, row by row; together they cover every pixel once.
+    /// The tiles of the picture that hold pixels of the film, row by row; together they cover every pixel once.
+    ///
+    /// They are those of the whole picture, since pixels of one tile may share paths: so the film of a part has the
+    /// bits of the whole.
     pub fn tiles(&self) -> Vec<Tile> {
         let (width, height) = self.size;
         let starts = |length: u32| (0..length).step_by(TILE as usize);
@@ -118,6 +149,7 @@ impl Film {
         starts(height)
             .flat_map(|y0| starts(width).map(move |x0| (x0, y0)))
             .map(|(x0, y0)| Tile { x0, y0, x1: end(x0, width), y1: end(y0, height) })
+            .filter(|tile| tile.common(self.window).area() > 0)
             .collect()
     }
 
@@ -134,19 +166,19 @@ impl Film {
             "{tile:?} reaches beyond a film of {:?}",
             self.size
         );
-        let pixels = (tile.x1 - tile.x0) as usize * (tile.y1 - tile.y0) as usize;
-        let sums = Sums::new(pixels, &self.layers).expect("memory for one tile");
+        let sums = Sums::new(tile.area(), &self.layers, self.alpha).expect("memory for one tile");
         TileBuffer { tile, sums, non_finite: 0 }
     }
 
-    /// Adds the samples of a tile.
+    /// Adds the samples of a tile, as far as the film goes.
     pub fn merge(&mut self, buffer: TileBuffer) {
         let tile = buffer.tile;
         let tile_width = (tile.x1 - tile.x0) as usize;
-        for y in tile.y0..tile.y1 {
-            let from = (y - tile.y0) as usize * tile_width;
-            let to = y as usize * self.size.0 as usize + tile.x0 as usize;
-            for column in 0..tile_width {
+        let kept = tile.common(self.window);
+        for y in kept.y0..kept.y1 {
+            let from = (y - tile.y0) as usize * tile_width + (kept.x0 - tile.x0) as usize;
+            let to = self.index(kept.x0, y);
+            for column in 0..(kept.x1 - kept.x0) as usize {
                 self.sums.join(to + column, &buffer.sums, from + column);
             }
         }
@@ -158,25 +190,27 @@ impl Film {
         self.non_finite
     }
 
-    /// Mean radiance of a pixel, W·m⁻²·sr⁻¹ per channel; 0 without samples.
+    /// Mean radiance of a pixel of the picture, W·m⁻²·sr⁻¹ per channel; 0 without samples.
     ///
     /// # Panics
-    /// When the pixel lies outside.
+    /// When the pixel lies outside of the film.
     pub fn radiance(&self, x: u32, y: u32) -> Rgb {
         self.sums.mean[self.index(x, y)].as_vec3()
     }
 
-    /// Samples of a pixel, dropped ones not included.
+    /// Samples of a pixel of the picture, dropped ones not included.
     ///
     /// # Panics
-    /// When the pixel lies outside.
+    /// When the pixel lies outside of the film.
     pub fn samples(&self, x: u32, y: u32) -> u32 {
         self.sums.count[self.index(x, y)]
     }
 
     fn index(&self, x: u32, y: u32) -> usize {
-        assert!(x < self.size.0 && y < self.size.1, "pixel ({x}, {y}) outside {:?}", self.size);
-        y as usize * self.size.0 as usize + x as usize
+        let Tile { x0, y0, x1, y1 } = self.window;
+        let inside = (x0..x1).contains(&x) && (y0..y1).contains(&y);
+        assert!(inside, "pixel ({x}, {y}) outside {:?}", self.window);
+        (y - y0) as usize * (x1 - x0) as usize + (x - x0) as usize
     }
 }
 
@@ -215,12 +249,14 @@ impl TileBuffer {
             "pixel ({x}, {y}) outside {tile:?}"
         );
         let index = (y - tile.y0) as usize * (tile.x1 - tile.x0) as usize + (x - tile.x0) as usize;
-        if !sample.radiance.is_finite() || sample.radiance.min_element() < 0.0 {
+        let finite = sample.radiance.is_finite() && sample.transmittance.is_finite();
+        if !finite || sample.radiance.min_element() < 0.0 {
             self.non_finite += 1;
             return;
         }
         let to_rgb = |seen: Rgb| seen_at.map_or(seen, |set| set.to_rgb * seen);
         self.sums.push(index, to_rgb(sample.radiance));
+        add(&mut self.sums.transmittance, index, f64::from(sample.transmittance));
         if !self.sums.hits.is_empty()
             && let Some(hit) = &sample.first_hit
         {
@@ -253,7 +289,7 @@ fn filled<T: Clone + Default>(wanted: bool, count: usize) -> Result<Vec<T>, TryR
 }
 
 impl Sums {
-    fn new(pixels: usize, layers: &[Layer]) -> Result<Self, TryReserveError> {
+    fn new(pixels: usize, layers: &[Layer], alpha: bool) -> Result<Self, TryReserveError> {
         let wants = |layer| layers.contains(&layer);
         let of_first_hit = [
             Layer::Albedo,
@@ -266,6 +302,7 @@ impl Sums {
         Ok(Self {
             count: filled(true, pixels)?,
             mean: filled(true, pixels)?,
+            transmittance: filled(alpha, pixels)?,
             m2: filled(wants(Layer::Variance), pixels)?,
             hits: filled(of_first_hit.into_iter().any(wants), pixels)?,
             albedo: filled(wants(Layer::Albedo), pixels)?,
@@ -304,6 +341,7 @@ impl Sums {
         if let Some(m2) = self.m2.get_mut(i) {
             *m2 += spread + other.m2[j];
         }
+        join(&mut self.transmittance, i, &other.transmittance, j);
         join(&mut self.hits, i, &other.hits, j);
         join(&mut self.albedo, i, &other.albedo, j);
         join(&mut self.normal, i, &other.normal, j);
@@ -334,7 +372,7 @@ mod tests {
     use glam::{Vec2, Vec3};
 
     fn gray(value: f32) -> PixelSample {
-        PixelSample { radiance: Rgb::splat(value), first_hit: None }
+        PixelSample { radiance: Rgb::splat(value), first_hit: None, ..PixelSample::default() }
     }
 
     fn whole(film: &Film) -> Tile {
@@ -390,6 +428,7 @@ mod tests {
         let sample = |x: u32, y: u32, s: u32| PixelSample {
             radiance: Rgb::new(x as f32 * 0.1, y as f32 * 0.37, s as f32 / 3.0),
             first_hit: (s != 1).then(|| hit(x + 1)),
+            ..PixelSample::default()
         };
         let fill = |tile: Tile| {
             let mut buffer = empty.tile_buffer(tile);
@@ -434,10 +473,22 @@ mod tests {
         buffer.add(1, 0, &gray(3.0));
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0] {
             let radiance = Rgb::new(1.0, bad, 1.0);
-            buffer.add(1, 0, &PixelSample { radiance, first_hit: Some(hit(1)) });
+            buffer.add(
+                1,
+                0,
+                &PixelSample { radiance, first_hit: Some(hit(1)), ..PixelSample::default() },
+            );
         }
         let broken_hit = FirstHit { depth: f32::NAN, ..hit(1) };
-        buffer.add(0, 0, &PixelSample { radiance: Rgb::ONE, first_hit: Some(broken_hit) });
+        buffer.add(
+            0,
+            0,
+            &PixelSample {
+                radiance: Rgb::ONE,
+                first_hit: Some(broken_hit),
+                ..PixelSample::default()
+            },
+        );
         film.merge(buffer);
         assert_eq!(film.radiance(1, 0), Rgb::splat(3.0));
         assert_eq!(film.radiance(0, 0), Rgb::ONE);
@@ -457,7 +508,7 @@ mod tests {
                     buffer.add(
                         0,
                         0,
-                        &PixelSample { radiance: Rgb::ZERO, first_hit: Some(hit(id)) },
+                        &PixelSample { first_hit: Some(hit(id)), ..PixelSample::default() },
                     );
                 }
                 film.merge(buffer);

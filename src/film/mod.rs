@@ -13,16 +13,21 @@ pub use accumulate::{Film, FilmError, TileBuffer};
 pub use filter::FilterSampler;
 pub use planes::{Plane, PlaneSamples};
 
-use crate::description::Rgb;
+use crate::description::{RenderSettings, Rgb};
 use glam::{DVec3, Vec2, Vec3};
+use std::ops::Range;
 
 /// One sample of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSample {
     /// Radiance arriving at the film, W·m⁻²·sr⁻¹ per channel.
     pub radiance: Rgb,
     /// What the camera ray met first, if anything. Ignored unless an auxiliary layer is asked for.
     pub first_hit: Option<FirstHit>,
+    /// The share of the light from behind everything that would arrive: 0 where the ray has met something, or where
+    /// the radiance holds what is behind. Its mean may lie a little outside of `[0, 1]` where a medium is sampled.
+    /// Ignored unless the film has an alpha channel.
+    pub transmittance: f32,
 }
 
 /// The surface which a camera ray met first.
@@ -50,4 +55,50 @@ pub struct Tile {
     pub y0: u32,
     pub x1: u32,
     pub y1: u32,
+}
+
+impl Tile {
+    /// A whole picture of this size.
+    pub fn whole((width, height): (u32, u32)) -> Self {
+        Self { x0: 0, y0: 0, x1: width, y1: height }
+    }
+
+    /// What the settings ask for of a picture, as far as the picture goes.
+    pub fn rendered(settings: &RenderSettings) -> Self {
+        let whole = Self::whole(settings.size);
+        settings.region.map_or(whole, |(x0, y0, width, height)| {
+            let (x1, y1) = (x0.saturating_add(width), y0.saturating_add(height));
+            Self { x0, y0, x1, y1 }.common(whole)
+        })
+    }
+
+    /// What belongs to both; without pixels where nothing does.
+    #[must_use]
+    pub fn common(self, other: Self) -> Self {
+        let (x0, y0) = (self.x0.max(other.x0), self.y0.max(other.y0));
+        let (x1, y1) = (self.x1.min(other.x1), self.y1.min(other.y1));
+        Self { x0, y0, x1: x1.max(x0), y1: y1.max(y0) }
+    }
+
+    /// Whether some of these rows belong to it.
+    pub(crate) fn has_rows(&self, rows: &Range<u32>) -> bool {
+        rows.start < self.y1 && self.y0 < rows.end
+    }
+
+    /// Whether some of these columns belong to it.
+    pub(crate) fn has_columns(&self, columns: &Range<u32>) -> bool {
+        columns.start < self.x1 && self.x0 < columns.end
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.x1 - self.x0, self.y1 - self.y0)
+    }
+
+    /// The number of pixels.
+    pub fn area(&self) -> usize {
+        let (width, height) = self.size();
+        // Saturation cannot reach the allocator: it turns into its "capacity overflow".
+        (width as usize).saturating_mul(height as usize)
+    }
 }

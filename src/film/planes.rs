@@ -7,7 +7,7 @@ use glam::DVec3;
 /// One channel of a layer: its name and a number per pixel, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plane {
-    /// As in an EXR file: `R`, `G`, `B`, `X`, `Y`, `Z`, `id`, `samples`.
+    /// As in an EXR file: `R`, `G`, `B`, `A`, `X`, `Y`, `Z`, `id`, `samples`.
     pub name: &'static str,
     /// The numbers.
     pub samples: PlaneSamples,
@@ -25,7 +25,8 @@ pub enum PlaneSamples {
 impl Film {
     /// Develops a layer into linear planes, or `None` where the film does not collect it.
     ///
-    /// * `Beauty`: mean radiance. `Samples`: how many it is the mean of.
+    /// * `Beauty`: mean radiance, and where the film has it alpha, 1 − the mean transmittance: radiance is premultiplied
+    ///   by it (Porter and Duff 1984, "Compositing Digital Images", section 3). `Samples`: how many it is the mean of.
     /// * `Albedo`, `Normal`, `Position`, `Motion`, `Depth`: mean over the samples that met a surface;
     ///   normals are not made unit again, so that their length tells how much they agree. Without
     ///   a hit they are 0, and the depth is +∞.
@@ -40,7 +41,11 @@ impl Film {
         }
         let sums = &self.sums;
         Some(match layer {
-            Layer::Beauty => colors(["R", "G", "B"], &sums.mean),
+            Layer::Beauty => {
+                let mut planes = colors(["R", "G", "B"], &sums.mean);
+                planes.extend(self.alpha.then(|| self.alpha_plane()));
+                planes
+            }
             Layer::Albedo => colors(["R", "G", "B"], &self.mean_over_hits(&sums.albedo)),
             Layer::Normal => colors(["X", "Y", "Z"], &self.mean_over_hits(&sums.normal)),
             Layer::Position => colors(["X", "Y", "Z"], &self.mean_over_hits(&sums.position)),
@@ -65,6 +70,15 @@ impl Film {
     fn mean_over_hits(&self, sums: &[DVec3]) -> Vec<DVec3> {
         // A sum without hits is 0, and stays 0.
         sums.iter().zip(&self.sums.hits).map(|(&sum, &n)| sum / f64::from(n.max(1))).collect()
+    }
+
+    fn alpha_plane(&self) -> Plane {
+        let alpha = |(sum, &n): (&f64, &u32)| match n {
+            0 => 0.0, // nothing was seen
+            n => (1.0 - sum / f64::from(n)) as f32,
+        };
+        let pixels = self.sums.transmittance.iter().zip(&self.sums.count);
+        Plane { name: "A", samples: PlaneSamples::F32(pixels.map(alpha).collect()) }
     }
 
     fn depth(&self) -> Vec<f32> {
@@ -122,9 +136,13 @@ mod tests {
         };
         for first_hit in [Some(hit(1.0)), None, Some(hit(2.0))] {
             let radiance = Rgb::splat(first_hit.map_or(0.0, |h| h.depth));
-            buffer.add(0, 0, &PixelSample { radiance, first_hit });
+            buffer.add(0, 0, &PixelSample { radiance, first_hit, ..PixelSample::default() });
         }
-        buffer.add(1, 0, &PixelSample { radiance: Rgb::ONE, first_hit: None });
+        buffer.add(
+            1,
+            0,
+            &PixelSample { radiance: Rgb::ONE, first_hit: None, ..PixelSample::default() },
+        );
         film.merge(buffer);
         film
     }
@@ -165,7 +183,15 @@ mod tests {
         let mut film = Film::new((1, 1), &[Layer::Variance]).expect("small");
         let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: 1, y1: 1 });
         for value in [f32::MAX, f32::MAX, 0.0] {
-            buffer.add(0, 0, &PixelSample { radiance: Rgb::splat(value), first_hit: None });
+            buffer.add(
+                0,
+                0,
+                &PixelSample {
+                    radiance: Rgb::splat(value),
+                    first_hit: None,
+                    ..PixelSample::default()
+                },
+            );
         }
         film.merge(buffer);
         assert!(f32s(&film, Layer::Beauty, 0)[0].is_finite());

@@ -210,7 +210,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             first_disk,
             counters,
             gathered: Gathered::default(),
-            sample: PixelSample { radiance: Rgb::ZERO, first_hit: None },
+            sample: PixelSample::default(),
             distances: Vec::new(),
         };
         self.walk(walk, &key.sampler(), &mut context);
@@ -253,8 +253,10 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             self.path.scene.nested().escape(&walk.inside, &mut context.counters.nesting);
         }
         if hit.is_none() && !self.left_to_photons(walk) {
-            let light = self.path.infinite(&walk.ray, walk.arrival);
-            context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
+            let (light, transmittance) =
+                self.path.behind(&walk.ray, walk.throughput, walk.arrival, walk.depth);
+            context.sample.radiance += light;
+            context.sample.transmittance += transmittance;
         }
         hit.map_or(ControlFlow::Break(()), |hit| ControlFlow::Continue(Some(hit)))
     }

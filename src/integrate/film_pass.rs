@@ -43,7 +43,7 @@ impl IntegrateStatus {
         if control.cancel.load(Relaxed) {
             return None;
         }
-        Film::new(settings.size, &settings.layers).map_err(|error| self.error = Some(error)).ok()
+        Film::for_settings(settings).map_err(|error| self.error = Some(error)).ok()
     }
 }
 
@@ -58,6 +58,8 @@ pub(super) struct Job<'a> {
     pub(super) has_lens: bool,
     /// Side of the groups of pixels which share their paths; 1 for none.
     share: u32,
+    /// What of the picture is rendered.
+    window: Tile,
     pub(super) control: &'a RenderControl,
 }
 
@@ -75,6 +77,7 @@ impl<'a> Job<'a> {
             has_time: scene.requirements.need_time(),
             has_lens: scene.requirements.has(Feature::Lens),
             share: shared_side(settings, scene.requirements),
+            window: Tile::rendered(settings),
             control,
         }
     }
@@ -197,6 +200,7 @@ impl<'a> Begin<'a> {
             pixel: self.pixel(),
             samples: self.settings.samples,
             start: self.start(),
+            background: self.settings.background,
         }
     }
 }
@@ -245,8 +249,9 @@ fn render_pixels<const OPACITY: bool, I: Inside>(
 ) -> Option<(TileBuffer, PathCounters)> {
     let mut counters = PathCounters::default();
     let mut reported = 0;
-    for y in tile.y0..tile.y1 {
-        for x in tile.x0..tile.x1 {
+    let rendered = tile.common(job.window);
+    for y in rendered.y0..rendered.y1 {
+        for x in rendered.x0..rendered.x1 {
             for index in 0..job.settings.samples {
                 let scene = tracer.scene.of_sample(index);
                 let tracer = PathTracer { scene, ..*tracer };
@@ -255,7 +260,7 @@ fn render_pixels<const OPACITY: bool, I: Inside>(
                 buffer.add_seen(x, y, &sample, scene.surfaces.materials.wavelengths());
             }
         }
-        let samples = u64::from(tile.x1 - tile.x0) * u64::from(job.settings.samples);
+        let samples = u64::from(rendered.size().0) * u64::from(job.settings.samples);
         if !job.go_on(samples, counters.rays - reported) {
             return None;
         }
@@ -264,7 +269,8 @@ fn render_pixels<const OPACITY: bool, I: Inside>(
     Some((buffer, counters))
 }
 
-/// Sample by sample, in groups of neighbouring pixels which share their paths.
+/// Sample by sample, in groups of neighbouring pixels which share their paths. A group of which only a part is to be
+/// rendered is followed as a whole.
 fn render_groups<const OPACITY: bool, I: Inside>(
     mut buffer: TileBuffer,
     tile: Tile,
@@ -284,8 +290,8 @@ fn render_groups<const OPACITY: bool, I: Inside>(
         let shift = corner.two(index);
         let columns = groups(tile.x0, tile.x1, job.share, shift.x);
         let rows = groups(tile.y0, tile.y1, job.share, shift.y);
-        for row in rows {
-            for column in columns.clone() {
+        for row in rows.filter(|row| job.window.has_rows(row)) {
+            for column in columns.clone().filter(|column| job.window.has_columns(column)) {
                 for y in row.clone() {
                     for x in column.clone() {
                         let (sampler, camera_ray) = job.begin(&tracer.scene, (x, y), index);
@@ -299,7 +305,7 @@ fn render_groups<const OPACITY: bool, I: Inside>(
                 }
             }
         }
-        let samples = u64::from(tile.x1 - tile.x0) * u64::from(tile.y1 - tile.y0);
+        let samples = tile.common(job.window).area() as u64;
         if !job.go_on(samples, counters.rays - reported) {
             return None;
         }

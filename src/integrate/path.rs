@@ -20,7 +20,7 @@ use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
 use crate::build::light::Receiver;
 use crate::build::nesting::Meeting;
-use crate::description::Rgb;
+use crate::description::{Background, Rgb};
 use crate::extract::{CameraRay, NOTHING};
 use crate::film::{FirstHit, PixelSample};
 use crate::math::{Cone, Ray, offset_ray_origin};
@@ -56,6 +56,8 @@ pub struct PathTracer<'a, const OPACITY: bool, I> {
     pub samples: u32,
     /// What camera rays begin in; `None` where it depends on the ray.
     pub start: Option<I>,
+    /// What camera rays see that meet nothing.
+    pub background: Background,
 }
 
 /// What happened on the paths of one tile.
@@ -101,6 +103,7 @@ pub(super) struct Path<'a, I> {
     eta_scale: f32,
     pub(super) arrival: Arrival,
     first_hit: Option<FirstHit>,
+    transmittance: f32,
     pub(super) inside: I,
     /// Whether a light was drawn already.
     lit: bool,
@@ -127,6 +130,7 @@ impl<'a, I> Path<'a, I> {
             eta_scale: 1.0,
             arrival: Arrival::Sure,
             first_hit: None,
+            transmittance: 0.0,
             inside,
             lit: false,
             depth: 0,
@@ -208,7 +212,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
     ) -> PixelSample {
         let mut path = Path::new(camera_ray, self.pixel, self.start(&camera_ray.ray));
         self.follow::<false>(&mut path, camera_ray, sampler, counters);
-        PixelSample { radiance: path.radiance, first_hit: path.first_hit }
+        let Path { radiance, first_hit, transmittance, .. } = path;
+        PixelSample { radiance, first_hit, transmittance }
     }
 
     /// Like [`PathTracer::sample`], with what neighbours may use of the path kept apart.
@@ -220,7 +225,9 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
     ) -> SharedPath<'a> {
         let mut path = Path::new(camera_ray, self.pixel, self.start(&camera_ray.ray));
         self.follow::<true>(&mut path, camera_ray, sampler, counters);
-        let Path { radiance, first_hit, departure, mut landing, before, boost, .. } = path;
+        let Path {
+            radiance, first_hit, transmittance, departure, mut landing, before, boost, ..
+        } = path;
         let radiance = match &mut landing {
             Some(landing) => {
                 landing.leaving = radiance * boost;
@@ -228,7 +235,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             }
             None => radiance,
         };
-        SharedPath { sample: PixelSample { radiance, first_hit }, departure, landing }
+        SharedPath {
+            sample: PixelSample { radiance, first_hit, transmittance },
+            departure,
+            landing,
+        }
     }
 
     /// Follows a path to its end.
@@ -426,8 +437,27 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         if I::NESTS {
             self.scene.nested().escape(&path.inside, &mut counters.nesting);
         }
-        let light = self.infinite(&path.ray, path.arrival);
-        path.radiance += self.limited(path.throughput * light, path.depth);
+        let (light, transmittance) =
+            self.behind(&path.ray, path.throughput, path.arrival, path.depth);
+        path.radiance += light;
+        path.transmittance = transmittance;
+    }
+
+    /// What a path brings that has left the scene, and its share of the light from behind the picture: where the
+    /// background is transparent, a path that has met nothing sees nothing, and what media on its way have left
+    /// of its throughput would come through.
+    #[inline]
+    pub(super) fn behind(
+        &self,
+        ray: &Ray,
+        throughput: Rgb,
+        arrival: Arrival,
+        depth: u32,
+    ) -> (Rgb, f32) {
+        if depth == 0 && self.background == Background::Transparent {
+            return (Rgb::ZERO, throughput.element_sum() / 3.0);
+        }
+        (self.limited(throughput * self.infinite(ray, arrival), depth), 0.0)
     }
 
     /// Light straight from a light; where a path is lit first, from a light of each group.

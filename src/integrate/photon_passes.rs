@@ -109,7 +109,8 @@ impl PhotonReport {
 
 /// A tile over all passes.
 struct TileState {
-    tile: Tile,
+    /// What of it is rendered.
+    pixels: Tile,
     buffer: TileBuffer,
     radii: Vec<PixelRadius>,
     counters: PathCounters,
@@ -473,11 +474,11 @@ impl<'a> Setting<'a> {
 
 impl TileState {
     fn new(film: &Film, tile: Tile) -> Self {
-        let pixels = (tile.x1 - tile.x0) as usize * (tile.y1 - tile.y0) as usize;
+        let pixels = tile.common(film.window());
         Self {
-            tile,
+            pixels,
             buffer: film.tile_buffer(tile),
-            radii: vec![PixelRadius::default(); pixels],
+            radii: vec![PixelRadius::default(); pixels.area()],
             counters: PathCounters::default(),
             gathered: Gathered::default(),
         }
@@ -495,7 +496,7 @@ impl TileState {
         let settings = job.settings;
         let alpha = settings.photons.alpha;
         let by_passes = shrunk_by_passes(pass, alpha);
-        let Tile { x0, y0, x1, y1 } = self.tile;
+        let Tile { x0, y0, x1, y1 } = self.pixels;
         let before = self.counters.rays;
         let seen_at = tracer.path.scene.surfaces.materials.wavelengths();
         let mut pixels = self.radii.iter_mut();
@@ -525,7 +526,7 @@ impl TileState {
             self.gathered.include(&gathered);
             self.buffer.add_seen(x, y, &sample, seen_at);
         }
-        let samples = u64::from(x1 - x0) * u64::from(y1 - y0);
+        let samples = self.pixels.area() as u64;
         job.control.samples_done.fetch_add(samples, Relaxed);
         job.control.rays.fetch_add(self.counters.rays - before, Relaxed);
         Some(())

@@ -71,25 +71,39 @@ pub fn develop_exr(exr: &Path, png: &Path, development: Development) -> Result<(
 
 fn write_picture(path: &Path, picture: &Picture, facts: PngFacts) -> Result<(), OutputError> {
     let Development { exposure, tonemap } = facts.development;
-    let codes: Vec<u8> = picture
-        .radiance
-        .par_iter()
-        .flat_map_iter(|&radiance| develop(radiance, exposure, tonemap))
-        .collect();
+    let pixels = picture.radiance.par_iter();
+    let codes: Vec<u8> = match &picture.alpha {
+        None => pixels.flat_map_iter(|&light| develop(light, exposure, tonemap)).collect(),
+        Some(alpha) => pixels
+            .zip(alpha)
+            .flat_map_iter(|(&light, &alpha)| {
+                let [r, g, b] = develop(straight(light, alpha), exposure, tonemap);
+                [r, g, b, srgb::quantize_u8(f64::from(alpha))]
+            })
+            .collect(),
+    };
     let facts = serde_json::to_string(&facts).map_err(|source| OutputError::Json { source })?;
-    let bytes = encode(picture.size, &codes, facts)
+    let color = if picture.alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb };
+    let bytes = encode(picture.size, color, &codes, facts)
         .map_err(|source| OutputError::Png { path: path.to_owned(), source })?;
     write_atomically(path, &bytes)
 }
 
+/// The colour of what covers a pixel, as a PNG holds it (PNG, 3rd ed., section 6.2: alpha is not premultiplied).
+/// Light of what covers nothing, such as a glow without a body, has no place there.
+fn straight(light: Rgb, alpha: f32) -> Rgb {
+    if alpha > 0.0 { light / alpha } else { Rgb::ZERO }
+}
+
 fn encode(
     (width, height): (u32, u32),
+    color: png::ColorType,
     codes: &[u8],
     facts: String,
 ) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_color(color);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::Adaptive);
@@ -115,8 +129,10 @@ pub fn read_png_facts(path: &Path) -> Option<PngFacts> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::Background;
     use crate::film::PixelSample;
     use crate::output::exr_file::tests::metadata;
+    use crate::output::write_exr;
 
     #[test]
     fn exposure_and_curve_are_applied_before_the_codes() {
@@ -137,7 +153,11 @@ mod tests {
             for y in tile.y0..tile.y1 {
                 for x in tile.x0..tile.x1 {
                     let radiance = Rgb::new(srgb::decode_u8(x as u8), 0.0, y as f32);
-                    buffer.add(x, y, &PixelSample { radiance, first_hit: None });
+                    buffer.add(
+                        x,
+                        y,
+                        &PixelSample { radiance, first_hit: None, ..PixelSample::default() },
+                    );
                 }
             }
             film.merge(buffer);
@@ -155,6 +175,36 @@ mod tests {
         for (x, y, pixel) in picture.enumerate_pixels() {
             assert_eq!(pixel.0, [x as u8, 0, y as u8 * 255]);
         }
+    }
+
+    /// By hand: half of a pixel is covered with radiance 0.5, premultiplied 0.25.
+    #[test]
+    fn a_png_holds_straight_alpha() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let (exr, png) = (folder.path().join("a.exr"), folder.path().join("a.png"));
+        let settings = RenderSettings {
+            size: (2, 1),
+            background: Background::Transparent,
+            ..Default::default()
+        };
+        let mut film = Film::for_settings(&settings).expect("small");
+        let mut buffer = film.tile_buffer(film.tiles()[0]);
+        let covered = PixelSample { radiance: Rgb::splat(0.5), ..PixelSample::default() };
+        let empty = PixelSample { transmittance: 1.0, ..PixelSample::default() };
+        buffer.add(0, 0, &covered);
+        buffer.add(0, 0, &empty);
+        buffer.add(1, 0, &empty);
+        film.merge(buffer);
+        write_png(&png, &film, &settings, &metadata(5)).expect("writable");
+        let picture = image::open(&png).expect("just written").into_rgba8();
+        assert_eq!(picture.into_raw(), [188, 188, 188, 128, 0, 0, 0, 0]);
+        let rendered = std::fs::read(&png).expect("just written");
+        write_exr(&exr, &film, &settings, &metadata(5)).expect("writable");
+        let linear = Picture::read(&exr).expect("just written");
+        assert_eq!(linear.radiance, [Rgb::splat(0.25), Rgb::ZERO]);
+        assert_eq!(linear.alpha, Some(vec![0.5, 0.0]));
+        develop_exr(&exr, &png, settings.development()).expect("writable");
+        assert!(std::fs::read(&png).expect("just written") == rendered, "to the byte");
     }
 
     /// The chunk `sRGB` (PNG, 3rd ed., section 11.3.2.5) holds one byte, the intent.

@@ -1,4 +1,6 @@
-//! EXR files: one part per layer, and the facts of the run in every header.
+//! EXR files: one part per layer, or one for all, and the facts of the run in every header.
+//!
+//! The display window is the picture, the data window what was rendered of it.
 //!
 //! The custom facts are **one** text attribute `kinora` holding a JSON object. The encoder keeps custom
 //! attributes in a hash map with a random order; with a single entry equal frames are equal files,
@@ -8,8 +10,8 @@
 use super::picture::to_half;
 use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
 use crate::color::CHROMATICITIES;
-use crate::description::{Layer, RenderSettings, SceneDescription};
-use crate::film::{Film, Plane, PlaneSamples};
+use crate::description::{ExrLayout, Layer, RenderSettings, SceneDescription};
+use crate::film::{Film, Plane, PlaneSamples, Tile};
 use crate::frame::RenderedFrame;
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::world::World;
@@ -112,7 +114,6 @@ pub fn write_exr(
     settings: &RenderSettings,
     metadata: &FrameMetadata,
 ) -> Result<u64, OutputError> {
-    let size = Vec2(film.size().0 as usize, film.size().1 as usize);
     let mut layers = Layers::<AnyChannels<FlatSamples>>::new();
     let mut saturated = 0;
     let others = settings.layers.iter().copied().filter(|&layer| layer != Layer::Beauty);
@@ -125,15 +126,22 @@ pub fn write_exr(
         let Some(planes) = film.image(layer) else { continue };
         let halves = layer == Layer::Beauty && settings.exr_bits == 16;
         let channels = planes.into_iter().map(|plane| channel(plane, halves, &mut saturated));
-        layers.push(exr::image::Layer::new(
-            size,
-            layer_attributes(layer, metadata)?,
-            encoding(layer),
-            AnyChannels::sort(channels.collect()),
-        ));
+        match (settings.exr_layout, layers.first_mut()) {
+            (ExrLayout::Single, Some(first)) => {
+                let mut all = std::mem::take(&mut first.channel_data.list);
+                all.extend(channels.map(|channel| in_layer(layer, channel)));
+                first.channel_data = AnyChannels::sort(all);
+            }
+            _ => layers.push(exr::image::Layer::new(
+                size_of(film.window()),
+                layer_attributes(layer, film, metadata)?,
+                encoding(layer),
+                AnyChannels::sort(channels.collect()),
+            )),
+        }
     }
     let mut bytes = Vec::new();
-    Image::from_layers(image_attributes(size), layers)
+    Image::from_layers(image_attributes(film), layers)
         .write()
         .to_buffered(Cursor::new(&mut bytes))
         .map_err(|source| OutputError::Exr { path: path.to_owned(), source })?;
@@ -155,19 +163,28 @@ pub fn read_metadata(path: &Path) -> Result<Option<FrameMetadata>, ExrError> {
     })
 }
 
-fn image_attributes(size: Vec2<usize>) -> ImageAttributes {
-    let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+fn size_of(part: Tile) -> Vec2<usize> {
+    Vec2(part.size().0 as usize, part.size().1 as usize)
+}
+
+/// The display window is the whole picture.
+fn image_attributes(film: &Film) -> ImageAttributes {
+    let whole = size_of(Tile::whole(film.size()));
+    let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions(whole));
     let [red, green, blue, white] = CHROMATICITIES.map(|(x, y)| Vec2(x, y));
     attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
     attributes
 }
 
+/// The data window begins where the film does.
 fn layer_attributes(
     layer: Layer,
+    film: &Film,
     metadata: &FrameMetadata,
 ) -> Result<LayerAttributes, OutputError> {
     let json = serde_json::to_string(metadata).map_err(|source| OutputError::Json { source })?;
     let mut attributes = LayerAttributes::named(layer_name(layer));
+    attributes.layer_position = Vec2(film.window().x0 as i32, film.window().y0 as i32);
     attributes.software_name = Some(text(&metadata.software));
     attributes.world_to_camera = Some(row_vector_convention(metadata.world_to_camera));
     attributes.frames_per_second = rational(metadata.fps);
@@ -230,11 +247,19 @@ fn channel(plane: Plane, halves: bool, saturated: &mut u64) -> AnyChannel<FlatSa
     AnyChannel::new(plane.name, samples)
 }
 
+/// A channel of a layer that shares a part with others, such as `albedo.R` (OpenEXR, "Technical Introduction",
+/// section on layers).
+fn in_layer(layer: Layer, mut channel: AnyChannel<FlatSamples>) -> AnyChannel<FlatSamples> {
+    channel.name = text(&format!("{}.{}", layer_name(layer), channel.name));
+    channel
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
     use crate::description::{Rgb, SceneDescription};
     use crate::film::{PixelSample, Tile};
+    use crate::output::picture::Picture;
     use exr::prelude::{ReadChannels, ReadLayers, read};
 
     pub fn metadata(fingerprint: u128) -> FrameMetadata {
@@ -249,7 +274,11 @@ pub(super) mod tests {
         let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: values.len() as u32, y1: 1 });
         for (x, &value) in values.iter().enumerate() {
             let radiance = Rgb::new(value, 0.5 * value, 0.0);
-            buffer.add(x as u32, 0, &PixelSample { radiance, first_hit: None });
+            buffer.add(
+                x as u32,
+                0,
+                &PixelSample { radiance, first_hit: None, ..PixelSample::default() },
+            );
         }
         film.merge(buffer);
         film
@@ -293,6 +322,28 @@ pub(super) mod tests {
         assert_eq!(attributes.world_to_camera.expect("set")[12..15], [1.0, 2.0, 3.0]);
         assert_eq!(attributes.frames_per_second, Some((24_000, 1000)));
         assert!(back.attributes.chromaticities.is_some());
+    }
+
+    /// What reads the first part alone finds all layers there, and the beauty under its plain names.
+    #[test]
+    fn one_part_may_hold_all_layers() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("f.exr");
+        let layers = vec![Layer::Albedo, Layer::Depth, Layer::Samples, Layer::Variance];
+        let film = film(&[0.25, 0.5], &layers);
+        let settings =
+            RenderSettings { layers, exr_layout: ExrLayout::Single, ..Default::default() };
+        write_exr(&path, &film, &settings, &metadata(7)).expect("writable");
+        assert_eq!(read_metadata(&path).expect("just written"), Some(metadata(7)));
+        let back = exr::prelude::read_all_flat_layers_from_file(&path).expect("just written");
+        assert_eq!(back.layer_data.len(), 1);
+        let channels = &back.layer_data[0].channel_data.list;
+        let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
+        let expected = "B G R albedo.B albedo.G albedo.R depth.Z samples.samples variance.B variance.G variance.R";
+        assert_eq!(names.join(" "), expected);
+        assert_eq!(channels[2].sample_data, FlatSamples::F32(vec![0.25, 0.5]));
+        assert_eq!(channels[7].sample_data, FlatSamples::U32(vec![1, 1]));
+        assert_eq!(Picture::read(&path).expect("just written"), Picture::of_film(&film, &settings));
     }
 
     #[test]

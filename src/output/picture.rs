@@ -20,19 +20,30 @@ pub(super) struct Picture {
     pub size: (u32, u32),
     /// One for each pixel.
     pub radiance: Vec<Rgb>,
+    /// How much of each pixel is covered, where the background is transparent: radiance is premultiplied by it.
+    pub alpha: Option<Vec<f32>>,
 }
 
 impl Picture {
     /// What [`write_exr`](super::write_exr) would write.
     pub fn of_film(film: &Film, settings: &RenderSettings) -> Self {
-        let mut radiance = vec![Rgb::ZERO; film.size().0 as usize * film.size().1 as usize];
+        let mut radiance = vec![Rgb::ZERO; film.window().area()];
+        let mut alpha = None;
         for (channel, plane) in film.image(Layer::Beauty).into_iter().flatten().enumerate() {
-            let PlaneSamples::F32(values) = plane.samples else { continue };
-            for (pixel, value) in radiance.iter_mut().zip(values) {
-                pixel[channel] = if settings.exr_bits == 16 { as_half(value) } else { value };
+            let PlaneSamples::F32(mut values) = plane.samples else { continue };
+            if settings.exr_bits == 16 {
+                for value in &mut values {
+                    *value = to_half(*value).to_f32();
+                }
+            }
+            if channel < 3 {
+                let pixels = radiance.iter_mut().zip(values);
+                pixels.for_each(|(pixel, value)| pixel[channel] = value);
+            } else {
+                alpha = Some(values);
             }
         }
-        Self { size: film.size(), radiance }
+        Self { size: film.window().size(), radiance, alpha }
     }
 
     /// Reads the first part of an EXR file that has colours.
@@ -51,10 +62,17 @@ impl Picture {
         let image = exr::prelude::read()
             .no_deep_data()
             .largest_resolution_level()
-            .rgb_channels(
-                |size, _| (size.0, vec![Rgb::ZERO; size.area()]),
-                |(width, pixels), at, (r, g, b): (f32, f32, f32)| {
-                    pixels[at.1 * *width + at.0] = Rgb::new(r, g, b);
+            .rgba_channels(
+                |size, (.., alpha)| {
+                    let opaque = alpha.as_ref().map(|_| vec![1.0; size.area()]);
+                    (size.0, vec![Rgb::ZERO; size.area()], opaque)
+                },
+                |(width, radiance, alpha), at, (r, g, b, a): (f32, f32, f32, f32)| {
+                    let index = at.1 * *width + at.0;
+                    radiance[index] = Rgb::new(r, g, b);
+                    if let Some(alpha) = alpha {
+                        alpha[index] = a;
+                    }
                 },
             )
             .first_valid_layer()
@@ -62,14 +80,9 @@ impl Picture {
             .from_file(path)
             .map_err(failed)?;
         let size = image.layer_data.size;
-        let radiance = image.layer_data.channel_data.pixels.1;
-        Ok(Self { size: (size.0 as u32, size.1 as u32), radiance })
+        let (_, radiance, alpha) = image.layer_data.channel_data.pixels;
+        Ok(Self { size: (size.0 as u32, size.1 as u32), radiance, alpha })
     }
-}
-
-/// A number as it comes back from a file of 16 bits; beyond its range the end of it.
-pub(super) fn as_half(value: f32) -> f32 {
-    to_half(value).to_f32()
 }
 
 /// A number for a file of 16 bits; beyond its range the end of it.

@@ -288,6 +288,18 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
             limits::number(report, size, f64::from(width) * f64::from(height), &limits::AREA);
         }
     }
+    if let (Some(region), Some((x, y, w, h))) = (fields.get("region"), render.region) {
+        let ends = |start: u32, length: u32, side: u32| {
+            length > 0 && start.checked_add(length).is_some_and(|end| end <= side)
+        };
+        if !(ends(x, w, width) && ends(y, h, height)) {
+            let message = format!(
+                "`region` is left, top, width and height of a part of the picture, {width} × {height} pixels, but is ({x}, \
+                 {y}, {w}, {h})"
+            );
+            report.at("scene::out-of-range", region, message);
+        }
+    }
     let numbers = [
         ("samples", f64::from(render.samples), &limits::SAMPLES),
         ("max_depth", f64::from(render.max_depth), &limits::DEPTH),
