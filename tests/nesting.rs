@@ -408,6 +408,39 @@ fn a_ray_inside_by_surprise_counts_once() {
     assert!((paths..=2 * paths).contains(&count), "{count} of {paths}: {warning}");
 }
 
+/// Oracle: a ball of glass, in two open halves, with a ball of water in it across the seam, absorbs nothing and cannot be seen in an even
+/// sky: light that enters by one half and leaves by the other has entered and left one solid, and nothing is warned of.
+#[test]
+fn open_meshes_of_one_material_enclose_one_solid() {
+    let ball = icosphere(3, false);
+    let half = |upper: bool| {
+        let mut half = ball.clone();
+        let is_upper =
+            |t: &[u32; 3]| t.iter().map(|&k| ball.positions[k as usize].y).sum::<f32>() > 0.0;
+        half.triangles.retain(|t| is_upper(t) == upper);
+        half
+    };
+    let text = format!(
+        r#"(render: (filter: Box(), integrator: Path), meshes: {{ {}, {} }},
+        materials: {{"glass": Dielectric(ior: 1.5), "water": Dielectric(ior: 1.333, priority: 1)}},
+        entities: {{
+            "camera": (transform: (translation: (0, 0.3, 4), look_at: (0, 0, 0)), camera: (fov: 30)),
+            "sky": (light: Sky(radiance: 1)),
+            "upper": (shape: Mesh("upper"), material: "glass"),
+            "lower": (shape: Mesh("lower"), material: "glass"),
+            "drop": (transform: (translation: (0.1, 0.05, 0)), shape: Sphere(radius: 0.5), material: "water"),
+        }})"#,
+        mesh_text("upper", &half(true)),
+        mesh_text("lower", &half(false)),
+    );
+    let picture = render(&text, (16, 16), 64);
+    assert!(picture.report.warnings.is_empty(), "{:?}", picture.report.warnings);
+    let lost: f64 = picture.green().iter().map(|value| (1.0 - value).abs()).sum::<f64>() * 64.0;
+    // Total reflection holds some paths for long; none may be lost but those that are counted.
+    let trapped = picture.report.truncated_paths;
+    assert!(lost <= trapped as f64 + 0.5, "{lost} lost, {trapped} trapped");
+}
+
 /// A ball whose normals point inwards, in water: rays leave it before they enter it. The warning says
 /// where; sound scenes have none (see the tests above).
 #[test]

@@ -15,11 +15,15 @@
 //! right for water whose only surface is that on top, if nothing else lies between. Where a shape is closed
 //! whatever its measures are, the ray that begins there is asked instead: on the border itself, where the point
 //! is neither inside nor outside, the ray is in what it goes through first.
+//!
+//! # Solids of several meshes
+//! A bottle may be made of a body and a neck, each with a border. Open meshes of one material whose boxes overlap are one
+//! solid, which may be entered through the one and left through the other.
 
 use super::bvh::{Hit, MeshTree, MeshTrees, SceneGeometry, SurfacePoint};
 use super::density::Densities;
 use crate::color::wavelength::{self, DrawnWavelength};
-use crate::description::Rgb;
+use crate::description::{Rgb, TriangleMesh};
 use crate::extract::{Geometry, Instance, Instances, NOTHING, Surfaces, overlapping_pairs, solids};
 use crate::math::{Aabb, Ray, offset_ray_origin};
 use crate::sampling::Sampler;
@@ -28,6 +32,7 @@ use crate::shade::medium::Passage;
 use crate::shade::nesting::{Inside, NestingFaults, Solid, SolidStack};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// How much wider than the rounding bound of a point other surfaces count as being at the same place.
@@ -43,10 +48,18 @@ pub struct Solids {
     places: Vec<u32>,
     /// Places of those which overlap an entry, entry by entry.
     neighbours: Vec<u32>,
+    /// Of the meshes for which it mattered, whether they are open.
+    open: KnownMeshes,
 }
+
+/// Meshes with something that is known of them.
+type KnownMeshes = Vec<(Arc<TriangleMesh>, bool)>;
 
 #[derive(Clone, Debug)]
 struct Entry {
+    /// The instance whose surface it is.
+    instance: u32,
+    /// What it encloses, with others perhaps: the solid has the index of the first of them.
     solid: Solid,
     bounds: Aabb,
     is_mesh: bool,
@@ -241,7 +254,10 @@ impl NestedGeometry<'_> {
         }
         for &other in &self.solids.neighbours[first as usize..last as usize] {
             let other = &self.solids.list[other as usize];
-            if count > MOST_AT_ONCE || !crate::extract::overlap(&other.bounds, &ends) {
+            let apart = !crate::extract::overlap(&other.bounds, &ends);
+            // At the seam of two parts of a solid it is crossed once.
+            let same = other.solid.instance == entry.solid.instance;
+            if count > MOST_AT_ONCE || apart || same {
                 continue;
             }
             let Some(hit) = self.hit(other, &probe, 1.0) else { continue };
@@ -257,7 +273,7 @@ impl NestedGeometry<'_> {
 
     /// The nearest hit of one solid.
     fn hit(&self, entry: &Entry, ray: &Ray, t_max: f64) -> Option<Hit> {
-        self.geometry.hit_of(entry.solid.instance, entry.tree.as_deref(), ray, t_max)
+        self.geometry.hit_of(entry.instance, entry.tree.as_deref(), ray, t_max)
     }
 
     fn has_holes(&self, hit: &Hit) -> bool {
@@ -353,6 +369,63 @@ fn is_thin(instance: &Instance) -> bool {
     volume / widest < ROUNDED * spacing
 }
 
+/// Finds which open meshes enclose a solid together.
+struct OpenMeshes<'a> {
+    instances: &'a [Instance],
+    meshes: &'a [Arc<MeshTree>],
+    before: &'a KnownMeshes,
+}
+
+impl OpenMeshes<'_> {
+    /// Makes one solid of open meshes of one material whose boxes overlap, those of `pairs` of places: the one with the
+    /// lowest index. Where such meshes do not close each other nothing is lost by that, since a solid can be entered twice.
+    fn unite(&self, list: &mut [Entry], pairs: &[(u32, u32)]) -> KnownMeshes {
+        let mut known = KnownMeshes::new();
+        // The lower place comes first in a pair, and has the lowest place of its solid when its turn comes.
+        for &(a, b) in pairs.iter().filter(|(a, b)| a < b) {
+            let (first, second) = (&list[a as usize], &list[b as usize]);
+            let same = first.solid.material == second.solid.material;
+            if same && [first, second].iter().all(|entry| self.is_open(entry, &mut known)) {
+                let (from, to) = (second.solid.instance, first.solid.instance);
+                let (lowest, other) = (from.min(to), from.max(to));
+                let members = list.iter_mut().filter(|entry| entry.solid.instance == other);
+                members.for_each(|entry| entry.solid.instance = lowest);
+            }
+        }
+        known
+    }
+
+    fn is_open(&self, entry: &Entry, known: &mut KnownMeshes) -> bool {
+        let Geometry::Mesh(mesh) = &self.instances[entry.instance as usize].geometry else {
+            return false;
+        };
+        let mesh = &self.meshes[*mesh as usize].mesh;
+        let find = |list: &KnownMeshes| {
+            list.iter().find(|(other, _)| Arc::ptr_eq(other, mesh)).map(|(_, open)| *open)
+        };
+        if let Some(open) = find(known) {
+            return open;
+        }
+        let open = find(self.before).unwrap_or_else(|| has_border(mesh));
+        known.push((mesh.clone(), open));
+        open
+    }
+}
+
+/// Whether a mesh has an edge that is not met by another of the opposite direction. Corners at one place are one corner.
+fn has_border(mesh: &TriangleMesh) -> bool {
+    // −0 and 0 are one place.
+    let place = |corner: u32| (mesh.positions[corner as usize] + 0.0).to_array().map(f32::to_bits);
+    let mut balance: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
+    for [a, b, c] in mesh.triangles.iter().map(|triangle| triangle.map(place)) {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let (edge, step) = if from < to { ([from, to], 1) } else { ([to, from], -1) };
+            *balance.entry(edge).or_default() += step;
+        }
+    }
+    balance.values().any(|&balance| balance != 0)
+}
+
 /// Writes [`Solids`] when objects or materials changed.
 pub fn find_solids(
     instances: Res<Instances>,
@@ -381,6 +454,7 @@ pub fn find_solids(
                 Geometry::Primitive(primitive) => (false, primitive.is_closed()),
             };
             Entry {
+                instance: index,
                 solid,
                 bounds: instance.bounds,
                 is_mesh,
@@ -401,12 +475,14 @@ pub fn find_solids(
         .flat_map(|(a, b)| [(a, b), (b, a)])
         .collect();
     pairs.sort_unstable();
+    let open = OpenMeshes { instances: &instances.list, meshes: &meshes.list, before: &table.open };
+    let open = open.unite(&mut list, &pairs);
     for (place, entry) in (0..).zip(&mut list) {
         let start = |place: u32| pairs.partition_point(|pair| pair.0 < place) as u32;
         entry.neighbours = (start(place), start(place + 1));
     }
     let neighbours = pairs.into_iter().map(|pair| pair.1).collect();
-    *table = Solids { list, places, neighbours };
+    *table = Solids { list, places, neighbours, open };
 }
 
 impl Solids {
