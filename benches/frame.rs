@@ -115,6 +115,7 @@ fn features(c: &mut Criterion) {
         ior: 1.5,
         dispersion: None,
         roughness: 0.0.into(),
+        tint: Vec3::ONE.into(),
         attenuation,
         absorption: None,
         scattering: None,

@@ -29,6 +29,7 @@ fn materials() -> Vec<(&'static str, Material<u32>)> {
         ior: 1.5,
         dispersion: None,
         roughness: roughness.into(),
+        tint: Vec3::ONE.into(),
         attenuation: None,
         absorption: None,
         scattering: None,

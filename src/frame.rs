@@ -192,6 +192,10 @@ pub struct Simulation {
 /// glasses on a table 14 in 2.8·10⁷ did.
 const NESTING_BY_CHANCE: f64 = 1e-6;
 
+/// Share of paths let out of closed orbits which is not worth a word: where they go is the mean of what they would have
+/// seen, within a thousandth of the picture.
+const LET_OUT_UNSEEN: f64 = 1e-3;
+
 /// When stages began and how long systems took, written by the marker systems between them.
 #[derive(Resource, Default)]
 pub(crate) struct StageClock {
@@ -375,6 +379,7 @@ impl Simulation {
                 .chain(status.warnings)
                 .chain(self.nesting_warnings(&status.counters.nesting, status.counters.rays))
                 .chain(self.density_warning())
+                .chain(self.orbit_warning(status.counters.let_out, total))
                 .collect(),
         };
         let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
@@ -487,6 +492,18 @@ impl Simulation {
             format!(
                 "{count} times a density was found above its bound: the picture is right on average, but noisier there. \
                  Please report the scene"
+            )
+        })
+    }
+
+    /// Whether many paths were let out of closed orbits.
+    fn orbit_warning(&self, let_out: u64, samples: u64) -> Option<String> {
+        let most = self.world.resource::<Settings>().0.inner_reflections;
+        (let_out as f64 > LET_OUT_UNSEEN * samples as f64).then(|| {
+            format!(
+                "{let_out} paths of {samples} were let out of glass after {most} reflections inside, which they would not have \
+                 left: its normals are bent too far from its surface. Make the mesh finer, or the relief weaker; for long \
+                 light guides raise `render.inner_reflections`"
             )
         })
     }

@@ -288,3 +288,46 @@ fn no_sample_is_ever_not_a_number() {
         assert!(picture.green().iter().all(|v| v.is_finite() && *v >= 0.0), "{material}");
     }
 }
+
+/// Oracle: a parallel beam of irradiance E on a white metal, head on, is seen at the angle θ beside its mirror image with the radiance
+/// `E D(θ/2)/4`, `D` of GGX of the width α = roughness²: to either side of 0.0316, and down to a lobe 2·10⁻⁶ wide. Of the light within 4 α, the
+/// share within 2 α, and all of it together.
+#[test]
+fn a_highlight_is_as_wide_as_the_roughness_says() {
+    for roughness in [0.1, 0.0317, 0.031, 0.02, 0.005, 0.0015_f64] {
+        let alpha = roughness * roughness;
+        // The picture spans 4 α to either side.
+        let fov = 2.0 * (4.0 * alpha).atan().to_degrees();
+        let text = format!(
+            r#"(
+            render: (filter: Box(), integrator: Path, share: 1),
+            materials: {{"metal": Conductor(f0: Some((1, 1, 1)), roughness: {roughness})}},
+            entities: {{
+                "camera": (transform: (translation: (0, 0, 1)), camera: (fov: {fov})),
+                "sun": (light: Directional(irradiance: (1, 1, 1))),
+                "plate": (shape: Rectangle(), material: "metal"),
+            }})"#
+        );
+        let picture = common::render(&text, (32, 32), 64);
+        let (mut within, mut all) = ([0.0; 2], [0.0; 2]);
+        for (k, value) in picture.green().into_iter().enumerate() {
+            let place = |k: usize, j: u32| {
+                ((k as f64 + (f64::from(j) + 0.5) / 8.0) / 16.0 - 1.0) * 4.0 // in units of α
+            };
+            let mut expected = 0.0;
+            for j in 0..64 {
+                let theta2 = place(k % 32, j % 8).powi(2) + place(k / 32, j / 8).powi(2);
+                let d = (1.0 + theta2 / 4.0).powi(-2) / (std::f64::consts::PI * alpha * alpha);
+                expected += d / 4.0 / 64.0;
+            }
+            all = [all[0] + expected, all[1] + value];
+            if place(k % 32, 4).powi(2) + place(k / 32, 4).powi(2) < 4.0 {
+                within = [within[0] + expected, within[1] + value];
+            }
+        }
+        let (share, total) = (within[1] / all[1], all[1] / all[0]);
+        let expected = within[0] / all[0];
+        assert!((share / expected - 1.0).abs() < 0.01, "{roughness}: {share}, not {expected}");
+        assert!((total - 1.0).abs() < 0.01, "{roughness}: {total} of the light");
+    }
+}

@@ -298,25 +298,178 @@ fn no_shape_can_be_seen_in_an_even_sky() {
 /// rim: inside and outside are told by the triangle, not by the interpolated normal. The diffuse one
 /// is nowhere brighter than the sky.
 ///
-/// What is lost must be counted: reflection about normals that are not the surface's does not keep
-/// volumes of phase space, so that some paths are drawn into closed orbits of total reflections (seen:
-/// one of twelve triangles) which no depth ends. Those are fewer than one in a hundred here, and the
-/// only ones missing.
+/// Nothing is lost: reflection about normals that are not the surface's does not keep volumes of phase space, so that some paths are
+/// drawn into closed orbits of total reflections (seen: one of twelve triangles), but they are let out.
 #[test]
 fn coarse_meshes_with_smooth_normals_have_no_rims() {
     let glass = render(&under_sky("Dielectric()", "Mesh(\"smooth\")", "(1, 1, 1)"), (24, 24), 64);
     let missing: f64 = glass.green().iter().map(|value| 1.0 - value).sum::<f64>() * 64.0;
-    let trapped = glass.report.truncated_paths as f64;
-    assert!((missing - trapped).abs() < 0.5, "{missing} samples missing, {trapped} trapped");
-    assert!(trapped < 0.01 * 576.0 * 64.0, "{trapped} trapped");
+    assert!(missing.abs() < 0.5, "{missing} samples missing");
+    assert_eq!(glass.report.truncated_paths, 0);
     let brightest = glass.green().into_iter().fold(0.0, f64::max);
     assert!(brightest <= 1.0 + 1e-3, "{brightest}");
     let white = "Diffuse(albedo: (1, 1, 1))";
     let diffuse = render(&under_sky(white, "Mesh(\"smooth\")", "(1, 1, 1)"), (24, 24), 64);
-    for (k, value) in diffuse.green().iter().enumerate() {
-        assert!(*value <= 1.0 + 1e-3, "diffuse, pixel {k}: {value}");
+    for (k, (value, variance)) in diffuse.green().iter().zip(diffuse.variance()).enumerate() {
+        let bound = 6.0 * variance.sqrt() + 1e-3;
+        assert!((value - 1.0).abs() <= bound, "diffuse, pixel {k}: {value}, bound {bound}");
     }
-    assert!(diffuse.mean().mean >= 0.97, "{:?}", diffuse.mean());
+    let mean = diffuse.mean();
+    assert!((mean.mean - 1.0).abs() <= 3.0 * mean.error + 1e-3, "{mean:?}");
+}
+
+/// A body whose normals are not its surface's: a coarse mesh of a sphere, or a sphere with a bump map, which has hills as high as they
+/// are wide.
+fn bent(material: &str, mesh: bool) -> String {
+    let (shape, of) = if mesh { ("Mesh(\"coarse\")", "body") } else { ("Sphere()", "bumpy") };
+    format!(
+        r#"(
+        render: (filter: Box()),
+        textures: {{"hills": Noise(size: 0.2)}},
+        materials: {{
+            "body": {material}, "bumpy": Bump(material: "body", height: "hills", strength: 0.1),
+        }},
+        meshes: {{"coarse": Tessellated(shape: Sphere(), tolerance: 0.05)}},
+        entities: {{
+            "camera": (transform: (translation: (0, 0, 4)), camera: (fov: 36)),
+            "sky": (light: Sky(radiance: 1)),
+            "body": (transform: (rotation: (20, 30, 0)), shape: {shape}, material: "{of}"),
+        }})"#
+    )
+}
+
+/// Oracle: what absorbs nothing is invisible in an even sky, whatever its normals: what they send to the wrong side is thrown back,
+/// and who is caught in a closed orbit inside is let out, which is told where it is more than one in a thousand. Dropped, it was 5 %
+/// of the light on the bumps and half of it in single pixels. Level as for other materials, with the precision of the tables.
+#[test]
+fn bent_normals_lose_no_light() {
+    for (name, material, tables) in [
+        ("glass", "Dielectric()", 0.0),
+        ("frosted glass", "Dielectric(roughness: 0.3)", 2e-3),
+        ("mirror", "Mirror()", 0.0),
+        ("thin glass", "ThinGlass()", 0.0),
+        ("rough metal", "Conductor(f0: Some((1, 1, 1)), roughness: 0.4)", 2e-3),
+        ("plastic", "Plastic(albedo: (1, 1, 1))", 2e-5),
+        ("rough plastic", "Plastic(albedo: (1, 1, 1), roughness: 0.5)", 2e-3),
+        ("principled", "Principled(base_color: (1, 1, 1), metallic: 0.5)", 2e-3),
+        ("diffuse", "Diffuse(albedo: (1, 1, 1))", 2e-5),
+    ] {
+        for mesh in [true, false] {
+            // Bent normals lift mirror images to the horizon, where rounding decides what is met next.
+            let grazing = if mesh { 0.0 } else { 3e-3 };
+            let picture = render(&bent(material, mesh), (12, 12), 64);
+            for (k, (value, variance)) in picture.green().iter().zip(picture.variance()).enumerate()
+            {
+                let bound = 6.0 * variance.sqrt() + tables + 2e-5 + 16.0 * grazing;
+                assert!(
+                    (value - 1.0).abs() <= bound,
+                    "{name}, mesh {mesh}, pixel {k}: {value}, bound {bound}"
+                );
+            }
+            let mean = picture.mean();
+            let bound = 3.0 * mean.error + tables + 2e-5 + grazing;
+            assert!((mean.mean - 1.0).abs() <= bound, "{name}, mesh {mesh}: {mean:?}");
+            assert_eq!(picture.report.truncated_paths, 0, "{name}, mesh {mesh}");
+            let told = picture.report.warnings.iter().any(|warning| warning.contains("let out"));
+            if name == "glass" && !mesh {
+                assert!(told, "{:?}", picture.report.warnings);
+            }
+        }
+    }
+}
+
+/// A light guide whose normals are interpolated is not leaky where it may be longer than it is by default.
+#[test]
+fn how_many_reflections_a_guide_has_is_a_setting() {
+    let text = bent("Dielectric()", false);
+    let counts: Vec<u64> = [3, 1000]
+        .map(|most| {
+            let mut scene = common::scene(&text);
+            (scene.render.size, scene.render.samples) = ((8, 8), 16);
+            scene.render.inner_reflections = most;
+            let picture = common::render_description(&scene, 0);
+            let told =
+                picture.report.warnings.iter().find_map(|w| w.split(' ').next()?.parse().ok());
+            told.unwrap_or(0)
+        })
+        .into();
+    assert!(counts[0] > counts[1], "{counts:?}");
+}
+
+/// No sample of a white body in an even white sky is far above 1: 64 of them spread no pixel beyond 1.5, and the spread of one is
+/// below ½. Rough glass was drawn with weights up to 3 for each of its bounces, and had pixels of 6.
+#[test]
+fn rough_white_bodies_are_even_in_an_even_sky() {
+    for (name, material) in [
+        ("glass", "Dielectric(roughness: 1)"),
+        ("glass", "Dielectric(roughness: 0.5)"),
+        ("diamond", "Dielectric(ior: 2.4173, roughness: 0.8)"),
+        ("metal", "Conductor(f0: Some((1, 1, 1)), roughness: 1)"),
+        ("plastic", "Plastic(albedo: (1, 1, 1), roughness: 0.8)"),
+        ("principled", "Principled(base_color: (1, 1, 1), roughness: 0.8)"),
+        ("wall of glass", "Principled(base_color: (1, 1, 1), transmission: 1, roughness: 0.8)"),
+    ] {
+        let picture = render(&under_sky(material, "Sphere()", "(1, 1, 1)"), (12, 12), 64);
+        for (value, variance) in picture.green().iter().zip(picture.variance()) {
+            let spread = (variance * 64.0).sqrt();
+            assert!(*value < 1.5 && spread < 1.0, "{name}, {material}: {value}, {spread}");
+        }
+        let spread = picture.variance().iter().map(|v| v * 64.0).sum::<f64>() / 144.0;
+        assert!(spread.sqrt() < 0.5, "{name}, {material}: {}", spread.sqrt());
+    }
+}
+
+/// Oracle: in an even sky a solid that tints by τ at each crossing shows `F + (1 − F) τ²`, whatever its light does inside, for
+/// each ray that enters leaves once. Seen head on through an end of a box, index 1.5: 0.04 + 0.96 τ²; without an interface τ².
+#[test]
+fn each_crossing_of_glass_tints_once() {
+    for (ior, tint, roughness) in [
+        (1.5, "(0.5, 0.25, 1)", 0.0),
+        (1.5, "\"even\"", 0.0),
+        (1.0, "(0.5, 0.25, 1)", 0.0),
+        (1.5, "\"even\"", 0.02),
+    ] {
+        let text = format!(
+            r#"(
+            render: (filter: Box()),
+            textures: {{"even": Checker(a: (0.5, 0.25, 1), b: (0.5, 0.25, 1))}},
+            materials: {{"tinted": Dielectric(ior: {ior}, roughness: {roughness}, tint: {tint})}},
+            entities: {{
+                "camera": (transform: (translation: (0, 0, 4)), camera: (fov: 0.5)),
+                "sky": (light: Sky(radiance: 1)),
+                "body": (shape: Box(size: (4, 4, 1)), material: "tinted"),
+            }})"#
+        );
+        let f = ((ior - 1.0_f64) / (ior + 1.0)).powi(2);
+        let picture = render(&text, (8, 8), 256);
+        let error = picture.mean().error;
+        for (mean, tau) in picture.mean_of_channels().into_iter().zip([0.5, 0.25, 1.0]) {
+            let expected = f + (1.0 - f) * tau * tau;
+            assert!(
+                (mean - expected).abs() < 4.0 * error + 2e-3,
+                "{ior}, {tint}, {roughness}: {mean}, not {expected} ± {error}"
+            );
+        }
+    }
+}
+
+/// Oracle: sunlight that photons bring through a tinted sheet without an interface is τ² of what it was.
+#[test]
+fn photons_are_tinted_as_paths_are() {
+    let text = r#"(
+        render: (filter: Box(), integrator: Sppm, photons: (per_pass: Some(20000))),
+        materials: {"tinted": Dielectric(ior: 1, tint: (0.5, 0.25, 1)), "floor": Diffuse(albedo: (0.5, 0.5, 0.5))},
+        entities: {
+            "camera": (transform: (translation: (0, 0.4, 0), look_at: (0, 0, -0.05)), camera: (fov: 90)),
+            "sun": (transform: (rotation: (-90, 0, 0)), light: Directional(irradiance: (3.1415927, 3.1415927, 3.1415927))),
+            "sheet": (transform: (translation: (0, 1, 0)), shape: Box(size: (4, 0.5, 4)), material: "tinted"),
+            "floor": (transform: (rotation: (-90, 0, 0)), shape: Rectangle(size: (3, 3)), material: "floor"),
+        })"#;
+    let means = render(text, (8, 8), 16).mean_of_channels();
+    for (mean, tau) in means.into_iter().zip([0.5, 0.25, 1.0]) {
+        let expected = 0.5 * tau * tau;
+        assert!((mean / expected - 1.0).abs() < 0.04, "{means:?}, not {expected}");
+    }
 }
 
 /// Oracle: twenty glass shells in one another, each of two thin panes, are invisible: neither the depth

@@ -82,6 +82,7 @@ impl Tables {
             storable: &storable,
             min_alpha: 0.1,
             max_depth,
+            inner_reflections: 100,
             keep,
             inside: PhantomData,
         };

@@ -37,6 +37,9 @@ pub enum Material<R> {
         /// Perceptual roughness of the interface.
         #[serde(default = "smooth")]
         roughness: Value<f32, R>,
+        /// Share of the refracted light that each crossing of the surface lets through, per channel, in `[0, 1]`.
+        #[serde(default = "one")]
+        tint: Value<Rgb, R>,
         /// Absorption inside; `None` is perfectly clear.
         #[serde(default)]
         attenuation: Option<Attenuation>,
@@ -245,6 +248,7 @@ impl<R> Material<R> {
                 ior,
                 dispersion,
                 roughness,
+                tint,
                 attenuation,
                 absorption,
                 scattering,
@@ -255,6 +259,7 @@ impl<R> Material<R> {
                 ior,
                 dispersion,
                 roughness: roughness.map_ref(textures)?,
+                tint: tint.map_ref(textures)?,
                 attenuation,
                 absorption: absorption.map(&mut *textures).transpose()?,
                 scattering,

@@ -45,6 +45,9 @@ pub struct RenderSettings {
     /// What the throughput of a path is multiplied by to be its probability to survive Russian
     /// roulette. Trades variance for time; no bias.
     pub roulette_gain: f32,
+    /// Reflections in a row inside of a solid, about interpolated or bumped normals, after which light leaves
+    /// it straight on. Trades the length of light guides against paths caught in closed orbits.
+    pub inner_reflections: u32,
     /// Side, in pixels, of the groups of pixels whose paths use each other's continuations; 1 for none.
     /// Trades the independence of the noise of neighbouring pixels, and shadow rays, for less of it; no
     /// bias.
@@ -103,6 +106,7 @@ impl Default for RenderSettings {
             max_depth: 1000,
             roulette_depth: 2,
             roulette_gain: 2.5,
+            inner_reflections: 100,
             share: 4,
             spectral: false,
             integrator: IntegratorChoice::Auto,

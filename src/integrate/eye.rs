@@ -35,7 +35,7 @@ use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::medium::Fate;
 use crate::shade::nesting::Inside;
-use crate::shade::{Bsdf, BsdfSample, TransportMode};
+use crate::shade::{Bsdf, BsdfSample, InnerReflections, TransportMode};
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::ControlFlow;
@@ -161,6 +161,8 @@ pub(super) struct Walk<I> {
     pub(super) met: u32,
     /// Length of the path, metres.
     pub(super) length: f64,
+    /// Reflections in a row inside of a solid.
+    inner: InnerReflections,
     /// Whether it belongs to a final gathering.
     pub(super) reads: bool,
     /// Whether it only looks for a light.
@@ -200,6 +202,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             depth: 0,
             met: 0,
             length: 0.0,
+            inner: InnerReflections::new(self.path.inner_reflections),
             reads: false,
             last: false,
             whole: true,
@@ -350,7 +353,10 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             self.final_gathering(walk, &vertex, &receiver, &sides, context);
         }
         let lobe = self.split(walk, &vertex, (lobe, direction), &sides, sampler, context);
-        let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { return false };
+        let Some((wi, drawn)) = vertex.scatter(lobe, direction, &mut walk.inner) else {
+            return false;
+        };
+        context.counters.let_out += u64::from(walk.inner.was_let_out());
         let diffuse = storable && !drawn.delta;
         if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
             return false;
@@ -401,8 +407,8 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let (first, second) = (p * lobe, p + (1.0 - p) * lobe);
         let ((likely, share), (other, rest)) =
             if p > 0.5 { ((first, p), (second, 1.0 - p)) } else { ((second, 1.0 - p), (first, p)) };
-        if let Some((wi, drawn)) = vertex.scatter(likely, direction) {
-            let mut branch = *walk;
+        let mut branch = *walk;
+        if let Some((wi, drawn)) = vertex.scatter(likely, direction, &mut branch.inner) {
             branch.throughput *= share;
             self.turn(&mut branch, vertex, &vertex.receiver(), (wi, &drawn), false, sides);
             self.walk(branch, sampler, context);
@@ -528,11 +534,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             let dimensions = dimension::vertex(walk.met - 1);
             let lobe = sampler.one(dimensions + dimension::LOBE);
             let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
-            let Some((wi, drawn)) = vertex.scatter(lobe, direction) else { continue };
+            let mut ray = Walk { reads: true, throughput: walk.throughput / n as f32, ..*walk };
+            let drawn = vertex.scatter(lobe, direction, &mut ray.inner);
+            let Some((wi, drawn)) = drawn else { continue };
             if drawn.delta {
                 continue; // the camera path itself goes on there
             }
-            let mut ray = Walk { reads: true, throughput: walk.throughput / n as f32, ..*walk };
             self.turn(&mut ray, vertex, receiver, (wi, &drawn), true, sides);
             self.walk(ray, &sampler, context);
         }
@@ -642,6 +649,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let kernel = self.settings.kernel;
         let radius2 = query.radius * query.radius;
         let allowed = self.path.max_depth.saturating_sub(walk.depth);
+        let (shaded, ns) = (vertex.shaded(), vertex.surface.ns);
         let wo_local = vertex.frame.to_local(vertex.wo);
         let mut light = Rgb::ZERO;
         let mut found = 0;
@@ -651,17 +659,28 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             }
             found += 1;
             let wi = photon.wi();
-            if !vertex.is_consistent(wi) {
+            if !shaded.is_consistent(wi) {
                 return;
             }
+            let back = shaded.thrown_back(wi);
             let weight = kernel.weight(distance2, radius2);
             match vertex.bsdf {
                 Bsdf::Diffuse(_) if vertex.crosses(wi) => {}
                 // The same for all: it is multiplied by at the end.
-                Bsdf::Diffuse(_) => light += photon.power * weight,
+                Bsdf::Diffuse(_) => {
+                    let thrown_back = back.map_or(0.0, |from| (from.dot(ns) / wi.dot(ns)).abs());
+                    light += photon.power * (weight * (1.0 + thrown_back));
+                }
                 _ => {
-                    let f = bsdf_value(&vertex.bsdf, wo_local, vertex.frame.to_local(wi));
-                    light += f * photon.power * weight;
+                    let f_cos = |wi: Vec3| {
+                        let wi = vertex.frame.to_local(wi);
+                        vertex.bsdf.evaluate(wo_local, wi, TransportMode::Radiance).f_cos
+                    };
+                    let f_cos = f_cos(wi) + back.map_or(Rgb::ZERO, f_cos);
+                    if f_cos != Rgb::ZERO {
+                        // Without the cosine: that is in how densely photons arrive.
+                        light += f_cos / wi.dot(ns).abs() * photon.power * weight;
+                    }
                 }
             }
         });
@@ -671,11 +690,4 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             _ => light,
         }
     }
-}
-
-/// The BSDF itself, without the cosine: that is in how densely photons arrive.
-#[inline]
-fn bsdf_value(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> Rgb {
-    let f_cos = bsdf.evaluate(wo, wi, TransportMode::Radiance).f_cos;
-    if f_cos == Rgb::ZERO { Rgb::ZERO } else { f_cos / wi.z.abs() }
 }

@@ -194,6 +194,7 @@ impl<'a> Begin<'a> {
             max_depth: self.settings.max_depth,
             roulette_depth: self.settings.roulette_depth,
             roulette_gain: self.settings.roulette_gain,
+            inner_reflections: self.settings.inner_reflections,
             clamp_indirect: self.settings.clamp_indirect,
             wants_first_hit: self.first_hit,
             origin: self.origin.0,

@@ -26,7 +26,7 @@ use crate::film::{FirstHit, PixelSample};
 use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::nesting::{Inside, NestingFaults};
-use crate::shade::{Bsdf, BsdfSample, TexturePoint};
+use crate::shade::{Bsdf, BsdfSample, InnerReflections, TexturePoint};
 use glam::{DVec3, Vec2, Vec3};
 use std::ops::ControlFlow;
 
@@ -44,6 +44,8 @@ pub struct PathTracer<'a, const OPACITY: bool, I> {
     pub roulette_depth: u32,
     /// A path survives with the probability of this times its throughput.
     pub roulette_gain: f32,
+    /// Reflections in a row inside of a solid with bent normals after which a path is let out.
+    pub inner_reflections: u32,
     /// Upper limit of a sample's radiance after its first bounce.
     pub clamp_indirect: Option<f32>,
     /// Whether the film wants to know what the camera ray met first.
@@ -67,6 +69,8 @@ pub struct PathCounters {
     pub rays: u64,
     /// Paths which were cut off at the greatest depth although they still carried something.
     pub truncated: u64,
+    /// Times a path was let out of a solid after too many reflections inside.
+    pub let_out: u64,
     /// Where solids were nested in a way that cannot be.
     pub nesting: NestingFaults,
 }
@@ -78,6 +82,7 @@ impl PathCounters {
         Self {
             rays: self.rays + other.rays,
             truncated: self.truncated + other.truncated,
+            let_out: self.let_out + other.let_out,
             nesting: self.nesting.plus(other.nesting),
         }
     }
@@ -113,6 +118,8 @@ pub(super) struct Path<'a, I> {
     pub(super) met: u32,
     departure: Option<Departure<'a>>,
     landing: Option<Landing>,
+    /// Reflections in a row inside of a solid.
+    inner: InnerReflections,
     /// Radiance gathered before the landing, and the throughput there.
     before: Rgb,
     throughput_before: Rgb,
@@ -121,7 +128,7 @@ pub(super) struct Path<'a, I> {
 }
 
 impl<'a, I> Path<'a, I> {
-    fn new(camera_ray: &CameraRay, pixel: Cone, inside: I) -> Self {
+    fn new(camera_ray: &CameraRay, pixel: Cone, inside: I, most_inner: u32) -> Self {
         Self {
             ray: camera_ray.ray,
             cone: pixel,
@@ -137,6 +144,7 @@ impl<'a, I> Path<'a, I> {
             met: 0,
             departure: None,
             landing: None,
+            inner: InnerReflections::new(most_inner),
             before: Rgb::ZERO,
             throughput_before: Rgb::ONE,
             boost: 1.0,
@@ -203,6 +211,11 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         self.start.unwrap_or_else(|| I::new(&self.scene.nested().around(ray)))
     }
 
+    fn path_along(&self, camera_ray: &CameraRay) -> Path<'a, I> {
+        let inside = self.start(&camera_ray.ray);
+        Path::new(camera_ray, self.pixel, inside, self.inner_reflections)
+    }
+
     /// The radiance which arrives along a camera ray.
     pub fn sample(
         &self,
@@ -210,7 +223,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> PixelSample {
-        let mut path = Path::new(camera_ray, self.pixel, self.start(&camera_ray.ray));
+        let mut path = self.path_along(camera_ray);
         self.follow::<false>(&mut path, camera_ray, sampler, counters);
         let Path { radiance, first_hit, transmittance, .. } = path;
         PixelSample { radiance, first_hit, transmittance }
@@ -223,7 +236,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) -> SharedPath<'a> {
-        let mut path = Path::new(camera_ray, self.pixel, self.start(&camera_ray.ray));
+        let mut path = self.path_along(camera_ray);
         self.follow::<true>(&mut path, camera_ray, sampler, counters);
         let Path {
             radiance, first_hit, transmittance, departure, mut landing, before, boost, ..
@@ -322,9 +335,10 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 path.lit = true;
                 path.radiance += self.limited(path.throughput * light, path.depth);
             }
-            let Some((wi, sample)) = vertex.scatter(lobe, to_scatter) else {
+            let Some((wi, sample)) = vertex.scatter(lobe, to_scatter, &mut path.inner) else {
                 break;
             };
+            counters.let_out += u64::from(path.inner.was_let_out());
             if SHARE && !sample.delta {
                 path.depart(&vertex, &sample);
             }

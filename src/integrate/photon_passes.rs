@@ -236,6 +236,7 @@ impl<'a> Setting<'a> {
             storable: &self.storable,
             min_alpha: self.job.settings.photons.min_alpha(),
             max_depth: self.job.settings.max_depth,
+            inner_reflections: self.job.settings.inner_reflections,
             keep,
             inside: PhantomData,
         }

@@ -15,6 +15,7 @@ pub mod medium;
 mod metals;
 pub mod nesting;
 mod relative;
+mod shading_normal;
 pub mod texture;
 
 pub use bsdf::{
@@ -24,4 +25,5 @@ pub use bsdf::{
 pub use material::{
     Chosen, Interior, MaterialTable, Surroundings, bent_normal, cycle, material_cycle,
 };
+pub use shading_normal::{InnerReflections, ShadedBsdf};
 pub use texture::{Pyramids, RenderTexture, TextureNeeds, TexturePoint, Textures};

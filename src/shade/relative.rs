@@ -9,7 +9,7 @@ use super::bsdf::{
     AlbedoTable, Bsdf, RoughDielectric, SmoothDielectric, dielectric_average, glass_table,
 };
 use super::material::{Width, alpha, glass_width};
-use crate::description::{Material, index_at_d};
+use crate::description::{Material, Rgb, index_at_d};
 use std::sync::OnceLock;
 
 /// The tables of all pairs that can be met.
@@ -71,18 +71,20 @@ impl Pair {
     }
 
     /// How the interface scatters; `roughness` reads a texture.
-    pub(super) fn bsdf(&self, eta: f32, roughness: impl FnOnce(u32) -> f32) -> Bsdf<'_> {
+    pub(super) fn bsdf(&self, eta: f32, tint: Rgb, roughness: impl FnOnce(u32) -> f32) -> Bsdf<'_> {
         let width = match self.width {
             Width::Smooth => None,
             Width::Constant(alpha) => Some(alpha),
-            Width::Texture(texture) => alpha(roughness(texture)),
+            Width::Texture(texture) => alpha(roughness(texture))
+                .filter(|&alpha| RoughDielectric::resolves(self.eta, alpha)),
         };
         match width.zip(self.width.widths()) {
-            None => Bsdf::SmoothDielectric(SmoothDielectric { eta }),
+            None => Bsdf::SmoothDielectric(SmoothDielectric { eta, tint }),
             Some((alpha, widths)) => {
                 let make = || (glass_table(self.eta, widths), dielectric_average(self.eta));
                 let (table, average) = self.made.get_or_init(make);
-                Bsdf::RoughDielectric(RoughDielectric::new(eta, table.at(alpha), *average))
+                let rough = RoughDielectric::new(eta, table.at(alpha), *average);
+                Bsdf::RoughDielectric(rough.tinted(tint))
             }
         }
     }

@@ -31,7 +31,7 @@ use crate::math::{Cone, Frame, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::medium::Fate;
 use crate::shade::nesting::{Inside, NestingFaults, SolidStack};
-use crate::shade::{Bsdf, BsdfSample, TransportMode};
+use crate::shade::{Bsdf, BsdfSample, InnerReflections, ShadedBsdf, TransportMode};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::marker::PhantomData;
@@ -184,6 +184,8 @@ pub struct PhotonTracer<'a, const OPACITY: bool, I> {
     pub min_alpha: f32,
     /// Greatest number of surface interactions.
     pub max_depth: u32,
+    /// Reflections in a row inside of a solid with bent normals after which a photon is let out.
+    pub inner_reflections: u32,
     /// Which photons are kept.
     pub keep: Keep,
     /// What a path must know of the solids around it.
@@ -263,7 +265,8 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
         let PhotonTracer { scene: NestedGeometry { geometry, materials, .. }, .. } = *self;
         let inside =
             I::new(&if I::NESTS { self.scene.around(&ray) } else { SolidStack::default() });
-        let mut walk = Walk { ray, power, inside, depth: 0, met: 0, only_specular: true };
+        let inner = InnerReflections::new(self.inner_reflections);
+        let mut walk = Walk { ray, power, inside, depth: 0, met: 0, only_specular: true, inner };
         loop {
             counters.rays += 1;
             let hit = geometry.closest_hit(&walk.ray, f64::INFINITY, false);
@@ -338,7 +341,8 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             }
             let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
             let scattering = Scattering::new(surface, -walk.ray.d, bsdf);
-            let Some((wi, sample, weight)) = scattering.draw(lobe, direction) else { return };
+            let drawn = scattering.draw(lobe, direction, &mut walk.inner);
+            let Some((wi, sample, weight)) = drawn else { return };
             walk.only_specular &= sample.delta || !storable;
             if self.keep == Keep::Caustics && !walk.only_specular {
                 return;
@@ -372,6 +376,8 @@ pub(super) struct Walk<I> {
     /// The same with surfaces which let the photon pass.
     pub(super) met: u32,
     pub(super) only_specular: bool,
+    /// Reflections in a row inside of a solid.
+    inner: InnerReflections,
 }
 
 /// Leaves a photon at a surface.
@@ -417,22 +423,21 @@ impl<'a> Scattering<'a> {
     }
 
     /// Draws where the photon goes on, with the factor on its power.
-    fn draw(&self, lobe: f32, u: Vec2) -> Option<(Vec3, BsdfSample, Rgb)> {
-        let draw = |frame: &Frame| {
-            let wo = frame.to_local(self.wo);
-            let sample = self.bsdf.sample(wo, lobe, u, TransportMode::Importance)?;
-            Some((frame.from_local(sample.wi).normalize(), sample))
-        };
-        let (wi, sample) = draw(&self.frame)?;
-        if self.crosses(wi) == sample.transmitted {
-            return Some((wi, sample, sample.weight * self.adjoint(wi)));
+    fn draw(
+        &self,
+        lobe: f32,
+        u: Vec2,
+        inner: &mut InnerReflections,
+    ) -> Option<(Vec3, BsdfSample, Rgb)> {
+        let Self { surface, frame, wo, bsdf } = self;
+        let shaded = ShadedBsdf { bsdf, frame, ng: surface.ng, wo: *wo };
+        let (wi, sample) = shaded.sample(lobe, u, TransportMode::Importance, inner)?;
+        if inner.was_let_out() {
+            return Some((wi, sample, sample.weight));
         }
-        if !sample.delta {
-            return None;
-        }
-        // Around the geometric normal there is nothing to correct.
-        let (wi, sample) = draw(&Frame::from_z(self.surface.ng))?;
-        (self.crosses(wi) == sample.transmitted).then_some((wi, sample, sample.weight))
+        // What is thrown back counts as it was drawn: its height above the surface is the same.
+        let drawn = frame.from_local(sample.wi);
+        Some((wi, sample, sample.weight * self.adjoint(drawn)))
     }
 
     /// `f*/f`.

@@ -305,6 +305,7 @@ fn check_render(render: &RenderSettings, fields: &IndexMap<String, Cursor>, repo
         ("max_depth", f64::from(render.max_depth), &limits::DEPTH),
         ("roulette_depth", f64::from(render.roulette_depth), &limits::ROULETTE),
         ("roulette_gain", f64::from(render.roulette_gain), &limits::ROULETTE_GAIN),
+        ("inner_reflections", f64::from(render.inner_reflections), &limits::DEPTH),
         ("share", f64::from(render.share), &limits::GROUP),
         ("clamp_indirect", f64::from(render.clamp_indirect.unwrap_or(1.0)), &limits::POSITIVE),
         ("final_gather", f64::from(render.final_gather), &limits::GATHER),

@@ -240,12 +240,13 @@ pub(super) fn read_material(
         Material::Mirror { reflectance } => {
             check.color("reflectance", reflectance, &limits::SHARE);
         }
-        Material::Dielectric { ior, dispersion, roughness, .. } => {
+        Material::Dielectric { ior, dispersion, roughness, tint, .. } => {
             let fine = limits::number(check.report, &cursor.at("ior"), *ior, &limits::IOR);
             if let Some(dispersion) = dispersion.as_ref().filter(|_| fine) {
                 check_dispersion(cursor, *ior, dispersion, check.report);
             }
             check.scalar("roughness", roughness);
+            check.color("tint", tint, &limits::SHARE);
             check_inside(&mut check, &material);
         }
         Material::ThinGlass { ior, tint } => {

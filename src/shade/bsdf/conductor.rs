@@ -4,7 +4,7 @@
 use super::energy::AlbedoAt;
 use super::fresnel::ConductorFresnel;
 use super::ggx::{Ggx, reflect};
-use super::{BsdfSample, BsdfValue};
+use super::{BsdfSample, BsdfValue, fresh, stretched};
 use crate::description::Rgb;
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -88,28 +88,39 @@ impl<'t> RoughConductor<'t> {
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let wi = if u_lobe < self.lobe.lost(wo.z) {
-            self.lobe.albedo.sample_returned(u)
+        let ggx = self.lobe.ggx();
+        let m = ggx.sample_visible(wo, u);
+        let reflected = reflect(wo, m);
+        // What does not get out is what returns later: the one happens as often as the other is worth.
+        let out = ggx.gets_out(wo, reflected);
+        let (wi, m) = if u_lobe < out {
+            (reflected, m)
         } else {
-            reflect(wo, self.lobe.ggx().sample_visible(wo, u))
+            let u = Vec2::new(stretched(u_lobe, out, 1.0), fresh(u));
+            let wi = self.lobe.albedo.sample_returned(u);
+            (wi, (wo + wi).normalize_or_zero())
         };
         if wi.z <= 0.0 {
             return None;
         }
-        BsdfSample::evaluated(wi, self.evaluate(wo, wi), false, 1.0)
+        BsdfSample::evaluated(wi, self.evaluate_at(wo, wi, m), false, 1.0)
     }
 
     #[inline]
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
+        self.evaluate_at(wo, wi, (wo + wi).normalize_or_zero())
+    }
+
+    /// The same where the half vector is known.
+    #[inline]
+    fn evaluate_at(&self, wo: Vec3, wi: Vec3, m: Vec3) -> BsdfValue {
         let ggx = self.lobe.ggx();
-        let m = (wo + wi).normalize_or_zero();
         let single = ggx.d(m) * ggx.v_cos(wo.z, wi.z);
         let lost = self.lobe.lost(wo.z);
         let reflectance = self.fresnel.reflectance(wo.dot(m).clamp(0.0, 1.0));
         BsdfValue {
             f_cos: reflectance * single + self.returned * self.lobe.returned_f_cos(lost, wi.z),
-            pdf: (1.0 - lost) * ggx.reflection_pdf(wo, m)
-                + lost * self.lobe.albedo.returned_pdf(wi.z),
+            pdf: single + lost * self.lobe.albedo.returned_pdf(wi.z),
         }
     }
 

@@ -10,9 +10,16 @@ use glam::Vec3;
 pub struct SmoothDielectric {
     /// Index inside (z < 0) over the index outside.
     pub eta: f32,
+    /// Share of the refracted light that each crossing lets through, per channel, in `[0, 1]`.
+    pub tint: Rgb,
 }
 
 impl SmoothDielectric {
+    /// Clear.
+    pub fn new(eta: f32) -> Self {
+        Self { eta, tint: Rgb::ONE }
+    }
+
     /// Share of the light from `wo` that is reflected.
     #[inline]
     #[expect(clippy::float_cmp, reason = "1 exactly means that there is no interface")]
@@ -32,7 +39,7 @@ impl SmoothDielectric {
             return None;
         }
         if self.eta == 1.0 {
-            return Some(BsdfSample::straight(wo, Rgb::ONE));
+            return Some(BsdfSample::straight(wo, self.tint));
         }
         // The relative index as the ray meets it, from its side to the other.
         let eta = if wo.z > 0.0 { self.eta } else { 1.0 / self.eta };
@@ -41,7 +48,7 @@ impl SmoothDielectric {
             return Some(BsdfSample::mirrored(wo, Rgb::ONE));
         }
         let wi = Vec3::new(-wo.x / eta, -wo.y / eta, -interface.mu_t.copysign(wo.z));
-        let weight = Rgb::splat(mode.transmission_factor(eta));
+        let weight = self.tint * mode.transmission_factor(eta);
         Some(BsdfSample { wi, weight, pdf: 0.0, delta: true, transmitted: true, eta })
     }
 }

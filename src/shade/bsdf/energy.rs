@@ -22,14 +22,17 @@ use super::fresnel::{dielectric, gauss_legendre, schlick_weight};
 use super::ggx::{Ggx, SMOOTH_BELOW_ALPHA, reflect, refract};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
-use std::f32::consts::TAU;
+use std::f32::consts::{FRAC_1_PI, TAU};
 use std::fmt;
 use std::sync::OnceLock;
 
 /// Nodes in `x`.
 const NODES: usize = 48;
+/// `c/α` of [`AlbedoAt::sample_returned`]: with it the weight of a returned direction is at most 1.6
+/// for `α ≥ 0.1`, and 3 for narrow lobes, which hardly ever return any.
+const RETURNED_SPREAD: f32 = 2.0;
 /// Rows of a table over all widths.
-const ROWS: usize = 40;
+const ROWS: usize = 48;
 
 /// `C` functions of a cosine, for one width `α` or for all.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +53,7 @@ pub(crate) struct AlbedoAt<'t, const C: usize> {
     alpha: f32,
     row: u32,
     fraction: f32,
-    /// `1 / ln((1 + α)/α)`.
+    /// `1 / ln(1 + 1/c²)` of [`AlbedoAt::sample_returned`].
     inverse_log: f32,
 }
 
@@ -74,7 +77,7 @@ impl<const C: usize> AlbedoTable<C> {
     /// The table at one width. A table made for a single width is taken as it is.
     #[inline]
     pub fn at(&self, alpha: f32) -> AlbedoAt<'_, C> {
-        let inverse_log = 1.0 / ((1.0 + alpha) / alpha).ln();
+        let inverse_log = 1.0 / (RETURNED_SPREAD * alpha).powi(-2).ln_1p();
         if self.rows.len() == 1 {
             return AlbedoAt { table: self, alpha, row: 0, fraction: 0.0, inverse_log };
         }
@@ -166,22 +169,28 @@ impl<const C: usize> AlbedoAt<'_, C> {
     /// Draws a direction for light which returns after several bounces: `z > 0`, with the density
     /// [`AlbedoAt::returned_pdf`]. `u` in `[0, 1)²`.
     ///
-    /// `(1 − E(μ)) μ` is what such light follows. At small widths `1 − E` falls like `(α/μ)²`
-    /// beyond `μ ~ α`, so that it leaves close to the horizon, where a cosine lobe hardly ever
-    /// looks. `ln(μ + α)` uniform keeps the weights bounded at every width.
+    /// `(1 − E(μ)) μ` is what such light follows. `1 − E` begins at `½` and falls like `(α/μ)²` beyond `μ ~ α`: close to
+    /// the horizon where `α` is small, and nearly as the cosine where it is 1. With `c` of the size of `α`,
+    ///
+    /// ```text
+    /// p(μ) = μ / (π (μ² + c²) ln(1 + 1/c²)),      μ = c √((1 + 1/c²)^u − 1)
+    /// ```
+    ///
+    /// does the same, and keeps the weights near 1 at every width.
     #[inline]
     pub fn sample_returned(&self, u: Vec2) -> Vec3 {
-        let mu = self.alpha * ((u.x / self.inverse_log).exp() - 1.0);
+        let mu = RETURNED_SPREAD * self.alpha * (u.x / self.inverse_log).exp_m1().sqrt();
         let mu = mu.clamp(f32::MIN_POSITIVE, 1.0);
         let r = ((1.0 - mu) * (1.0 + mu)).sqrt();
         let (sin, cos) = (TAU * u.y).sin_cos();
         Vec3::new(r * cos, r * sin, mu)
     }
 
-    /// `1 / (2π (μ + α) ln((1 + α)/α))`, per solid angle.
+    /// Its density per solid angle.
     #[inline]
     pub fn returned_pdf(&self, mu: f32) -> f32 {
-        self.inverse_log / (TAU * (mu + self.alpha))
+        let c = RETURNED_SPREAD * self.alpha;
+        self.inverse_log * mu * FRAC_1_PI / (mu * mu + c * c)
     }
 
     #[inline]

@@ -102,6 +102,15 @@ impl BsdfSample {
         Self { wi: -wo, weight, pdf: 0.0, delta: true, transmitted: true, eta: 1.0 }
     }
 
+    /// Straight on, into a medium of the relative index `eta`.
+    pub(in crate::shade) fn let_through(
+        wo: Vec3,
+        (eta, tint): (f32, Rgb),
+        mode: TransportMode,
+    ) -> Self {
+        Self { eta, ..Self::straight(wo, tint * mode.transmission_factor(eta)) }
+    }
+
     /// A direction of a lobe which is not a delta, with what evaluating it gave; `None` where it
     /// carries nothing.
     #[inline]
@@ -201,6 +210,17 @@ impl Bsdf<'_> {
         (p > 0.0 && p < 1.0).then_some(p)
     }
 
+    /// Where it encloses a solid: the index beyond the surface over the one on the side of `wo`, and the tint of a crossing.
+    #[inline]
+    pub fn refracts(&self, wo: Vec3) -> Option<(f32, Rgb)> {
+        let (eta, tint) = match self {
+            Self::SmoothDielectric(bsdf) => (bsdf.eta, bsdf.tint),
+            Self::RoughDielectric(bsdf) => (bsdf.eta(), bsdf.tint()),
+            _ => return None,
+        };
+        Some((if wo.z > 0.0 { eta } else { 1.0 / eta }, tint))
+    }
+
     /// Evaluates all lobes which are not deltas for a pair of directions.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, mode: TransportMode) -> BsdfValue {
@@ -264,7 +284,12 @@ impl Bsdf<'_> {
         match self {
             Self::Diffuse(bsdf) => bsdf.albedo,
             Self::Mirror(bsdf) => bsdf.reflectance,
-            Self::SmoothDielectric(_) | Self::RoughDielectric(_) => Rgb::ONE,
+            Self::SmoothDielectric(_) | Self::RoughDielectric(_) => {
+                self.refracts(wo).map_or(Rgb::ONE, |(eta, tint)| {
+                    let f = fresnel::dielectric_reflectance(mu, eta);
+                    tint + (Rgb::ONE - tint) * f
+                })
+            }
             Self::ThinGlass(bsdf) => bsdf.albedo(mu),
             Self::SmoothConductor(bsdf) => bsdf.albedo(mu),
             Self::RoughConductor(bsdf) => bsdf.albedo(mu),
@@ -273,6 +298,26 @@ impl Bsdf<'_> {
             Self::Principled(bsdf) => bsdf.albedo(mu),
         }
     }
+}
+
+/// A number uniform in `[0, 1)` which does not depend on what two others decide: a hash of their bits.
+///
+/// Where a facet was drawn and what it sends does not get out, the numbers which drew it are used up: of those that draw such
+/// facets they are not uniform.
+#[inline]
+fn fresh(u: Vec2) -> f32 {
+    // The finaliser of MurmurHash3 (Appleby 2011): every bit of its input changes every bit of its output.
+    let mut h = u.x.to_bits() ^ u.y.to_bits().wrapping_mul(0x9E37_79B1).rotate_left(15);
+    h = (h ^ (h >> 16)).wrapping_mul(0x85EB_CA6B);
+    h = (h ^ (h >> 13)).wrapping_mul(0xC2B2_AE35);
+    h ^= h >> 16;
+    (h >> 8) as f32 / (1_u32 << 24) as f32
+}
+
+/// What is left of a number in `[0, 1)` that lies in `[from, to)`, stretched to `[0, 1)`.
+#[inline]
+fn stretched(u: f32, from: f32, to: f32) -> f32 {
+    ((u - from) / (to - from)).clamp(0.0, 1.0_f32.next_down())
 }
 
 /// Samples a model which is the same from both sides; it sees `wo.z > 0`.

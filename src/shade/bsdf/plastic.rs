@@ -18,10 +18,10 @@
 use super::energy::AlbedoAt;
 use super::fresnel::dielectric_reflectance;
 use super::ggx::{Ggx, reflect};
-use super::{BsdfSample, BsdfValue, mean};
+use super::{BsdfSample, BsdfValue, fresh, mean, stretched};
 use crate::description::Rgb;
 use crate::sampling::warp::cosine_hemisphere;
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec2Swizzles, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// The diffuse base as it looks through a coat.
@@ -47,6 +47,13 @@ impl Base {
     #[inline]
     fn f_cos(&self, a_o: f32, a_i: f32, mu_i: f32) -> Rgb {
         self.albedo * ((1.0 - a_o) * (1.0 - a_i) * self.inverse_entering * mu_i * FRAC_1_PI)
+    }
+
+    /// Probability with which a facet decides between coat and base. That spares weights of `F/F̄` where it reflects more than
+    /// others; but over a dark base it would send nearly all light down there.
+    #[inline]
+    fn by_facet(&self) -> f32 {
+        mean(self.albedo)
     }
 
     /// Probability with which the coat is chosen rather than the base, where it reflects `a_o`.
@@ -114,29 +121,57 @@ impl<'t> RoughPlastic<'t> {
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let ggx = Ggx { alpha: self.coat.alpha() };
+        let by_facet = self.base.by_facet();
+        if u_lobe < by_facet {
+            // What the facet does not reflect, or what does not get out, reaches the base. The base has the
+            // numbers which are spread more evenly: it is the brighter one here.
+            let m = ggx.sample_visible(wo, Vec2::new(fresh(u), fresh(u.yx())));
+            let wi = reflect(wo, m);
+            let reflected = dielectric_reflectance(wo.dot(m).clamp(0.0, 1.0), self.eta);
+            return if u_lobe < by_facet * reflected * ggx.gets_out(wo, wi) {
+                BsdfSample::evaluated(wi, self.evaluate_at(wo, wi, m), false, 1.0)
+            } else {
+                self.sample_base(wo, u)
+            };
+        }
+        let u_lobe = stretched(u_lobe, by_facet, 1.0);
         let p = self.base.coat_probability(self.coat.value(wo.z)[0]);
-        let wi = if u_lobe < p {
-            reflect(wo, Ggx { alpha: self.coat.alpha() }.sample_visible(wo, u))
-        } else {
-            cosine_hemisphere(u)
-        };
+        if u_lobe >= p {
+            return self.sample_base(wo, u);
+        }
+        let m = ggx.sample_visible(wo, u);
+        let wi = reflect(wo, m);
         if wi.z <= 0.0 {
             return None;
         }
-        BsdfSample::evaluated(wi, self.evaluate(wo, wi), false, 1.0)
+        BsdfSample::evaluated(wi, self.evaluate_at(wo, wi, m), false, 1.0)
+    }
+
+    #[inline]
+    fn sample_base(&self, wo: Vec3, u: Vec2) -> Option<BsdfSample> {
+        let wi = cosine_hemisphere(u);
+        (wi.z > 0.0).then(|| BsdfSample::evaluated(wi, self.evaluate(wo, wi), false, 1.0))?
     }
 
     #[inline]
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
+        self.evaluate_at(wo, wi, (wo + wi).normalize_or_zero())
+    }
+
+    /// The same where the half vector is known.
+    #[inline]
+    fn evaluate_at(&self, wo: Vec3, wi: Vec3, m: Vec3) -> BsdfValue {
         let ggx = Ggx { alpha: self.coat.alpha() };
-        let m = (wo + wi).normalize_or_zero();
         let fresnel = dielectric_reflectance(wo.dot(m).clamp(0.0, 1.0), self.eta);
         let specular = fresnel * ggx.d(m) * ggx.v_cos(wo.z, wi.z);
         let (a_o, a_i) = (self.coat.value(wo.z)[0], self.coat.value(wi.z)[0]);
         let p = self.base.coat_probability(a_o);
+        let (by_facet, cosine) = (self.base.by_facet(), wi.z * FRAC_1_PI);
         BsdfValue {
             f_cos: Rgb::splat(specular) + self.base.f_cos(a_o, a_i, wi.z),
-            pdf: p * ggx.reflection_pdf(wo, m) + (1.0 - p) * wi.z * FRAC_1_PI,
+            pdf: by_facet * (specular + (1.0 - a_o) * cosine)
+                + (1.0 - by_facet) * (p * ggx.reflection_pdf(wo, m) + (1.0 - p) * cosine),
         }
     }
 

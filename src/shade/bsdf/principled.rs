@@ -20,10 +20,10 @@
 use super::conductor::ReflectorLobe;
 use super::fresnel::{SCHLICK_AVERAGE, normal_reflectance, schlick_weight};
 use super::ggx::reflect;
-use super::{BsdfSample, BsdfValue, SMOOTH_BELOW_ALPHA, mean};
+use super::{BsdfSample, BsdfValue, SMOOTH_BELOW_ALPHA, fresh, mean, stretched};
 use crate::description::Rgb;
 use crate::sampling::warp::cosine_hemisphere;
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec2Swizzles, Vec3};
 use std::f32::consts::FRAC_1_PI;
 
 /// Metallic–roughness with thin-walled transmission.
@@ -52,17 +52,17 @@ pub(crate) struct PrincipledParameters {
     pub transmission: f32,
 }
 
-/// Probabilities of the lobes.
+/// Probabilities of the lobes, seen from one direction.
 struct Choice {
-    gloss: f32,
     /// Cosine lobe on the side of the viewer.
     diffuse: f32,
-    /// Light of further bounces on the side of the viewer.
-    returned: f32,
-    /// Mirrored gloss on the other side; the smooth case goes straight on.
-    through: f32,
-    /// Light of further bounces on the other side.
-    through_returned: f32,
+    /// Of the light which facets keep from getting out: the share that comes back on the side of the viewer, the rest goes
+    /// through. `None` where none returns.
+    returned: Option<f32>,
+    /// Probability with which facets decide between base and gloss, rather than these numbers.
+    by_facet: f32,
+    /// Of that case, the share which goes to the base.
+    base_by_facet: f32,
 }
 
 impl<'t> Principled<'t> {
@@ -136,60 +136,134 @@ impl<'t> Principled<'t> {
         let through = transmitted * (1.0 - lost - a).max(0.0);
         let through_returned = transmitted * lost;
         let sum = specular + diffuse + returned + through + through_returned;
-        let scale = if sum > 0.0 { 1.0 / sum } else { 0.0 };
+        let back = mean(self.returned);
+        let by_facet = if self.lobe.is_some() && self.diffuse != Rgb::ZERO {
+            (mean(self.diffuse + self.transmitted) + back).min(1.0)
+        } else {
+            0.0
+        };
         Choice {
-            gloss: specular * scale,
-            diffuse: diffuse * scale,
-            returned: returned * scale,
-            through: through * scale,
-            through_returned: through_returned * scale,
+            by_facet,
+            base_by_facet: (1.0 - specular - through - (back + transmitted) * lost).max(0.0),
+            diffuse: if sum > 0.0 { diffuse / sum } else { 0.0 },
+            returned: (back + transmitted > 0.0).then(|| back / (back + transmitted)),
         }
+    }
+
+    /// Shares of the light that a facet reflects and lets through, means over the channels.
+    #[inline]
+    fn facet(&self, cos: f32) -> (f32, f32) {
+        let weight = schlick_weight(cos);
+        let f0 = mean(self.f0);
+        let through = mean(self.transmitted) * (1.0 - self.f0_dielectric) * (1.0 - weight);
+        (f0 + (1.0 - f0) * weight, through)
+    }
+
+    /// Probability with which a facet that is not passed over for the base reflects, rather than lets through.
+    #[inline]
+    fn reflects(&self, cos: f32) -> f32 {
+        let (f, through) = self.facet(cos);
+        if through > 0.0 { f / (f + through) } else { 1.0 }
     }
 
     #[inline]
     pub(super) fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let choice = self.choice(wo.z);
-        let gloss_direction = |lobe: &ReflectorLobe| reflect(wo, lobe.ggx().sample_visible(wo, u));
-        let mut end = choice.gloss;
+        if u_lobe < choice.by_facet {
+            let lobe = self.lobe.as_ref()?;
+            return self.sample_by_facet(lobe, wo, stretched(u_lobe, 0.0, choice.by_facet), u);
+        }
+        let u_lobe = stretched(u_lobe, choice.by_facet, 1.0);
+        if u_lobe < choice.diffuse {
+            return self.finish(wo, cosine_hemisphere(u), None, false);
+        }
+        let u_lobe = stretched(u_lobe, choice.diffuse, 1.0);
+        match &self.lobe {
+            Some(lobe) => self.sample_facet(lobe, &choice, wo, u_lobe, u),
+            None => Some(self.sample_smooth(&choice, wo, u_lobe)),
+        }
+    }
+
+    /// The mirror image, or straight on.
+    #[inline]
+    fn sample_smooth(&self, choice: &Choice, wo: Vec3, u_lobe: f32) -> BsdfSample {
+        let reflects = self.reflects(wo.z);
+        let p = 1.0 - choice.diffuse;
+        if u_lobe < reflects {
+            let f = self.f0 + (Rgb::ONE - self.f0) * schlick_weight(wo.z);
+            return BsdfSample::mirrored(wo, f / (p * reflects));
+        }
+        let a = self.dielectric_albedo(self.gloss(wo.z));
+        BsdfSample::straight(wo, self.transmitted * ((1.0 - a) / (p * (1.0 - reflects))))
+    }
+
+    /// What a facet makes of the light: gloss, what goes through, further bounces, and for all else the base. That spares weights
+    /// of `F/F̄` where it reflects more than others; but over a dark base it would send nearly all light down there. The base has
+    /// the numbers which are spread more evenly: it is the brighter one here.
+    fn sample_by_facet(
+        &self,
+        lobe: &ReflectorLobe,
+        wo: Vec3,
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<BsdfSample> {
+        let ggx = lobe.ggx();
+        let other = Vec2::new(fresh(u), fresh(u.yx()));
+        let m = ggx.sample_visible(wo, other);
+        let wi = reflect(wo, m);
+        let out = ggx.gets_out(wo, wi);
+        let (reflected, through) = self.facet(wo.dot(m));
+        let (back, over) = (mean(self.returned), mean(self.transmitted));
+        let (gloss, passed) = (reflected * out, (reflected + through) * out);
+        let (returned, end) = (out + back * (1.0 - out), out + (back + over) * (1.0 - out));
+        if u_lobe < passed {
+            return self.finish(wo, wi, Some(m), u_lobe >= gloss);
+        }
+        if u_lobe < out || u_lobe >= end {
+            return self.finish(wo, cosine_hemisphere(u), None, false);
+        }
+        let is_through = u_lobe >= returned;
+        let (from, to) = if is_through { (returned, end) } else { (out, returned) };
+        let left = Vec2::new(stretched(u_lobe, from, to), fresh(other));
+        self.finish(wo, lobe.albedo.sample_returned(left), None, is_through)
+    }
+
+    /// What a facet reflects or lets through, or the light of further bounces where that does not get out.
+    #[inline]
+    fn sample_facet(
+        &self,
+        lobe: &ReflectorLobe,
+        choice: &Choice,
+        wo: Vec3,
+        u_lobe: f32,
+        u: Vec2,
+    ) -> Option<BsdfSample> {
+        let ggx = lobe.ggx();
+        let m = ggx.sample_visible(wo, u);
+        let wi = reflect(wo, m);
+        let reflects = self.reflects(wo.dot(m));
+        let through = u_lobe >= reflects;
+        let (from, to) = if through { (reflects, 1.0) } else { (0.0, reflects) };
+        let Some(share) = choice.returned else { return self.finish(wo, wi, Some(m), through) };
+        let end = from + (to - from) * ggx.gets_out(wo, wi);
         if u_lobe < end {
-            let Some(lobe) = &self.lobe else {
-                let f = self.f0 + (Rgb::ONE - self.f0) * schlick_weight(wo.z);
-                return Some(BsdfSample::mirrored(wo, f / choice.gloss));
-            };
-            return self.finish(wo, gloss_direction(lobe), false);
+            return self.finish(wo, wi, Some(m), through);
         }
-        end += choice.diffuse;
-        if u_lobe < end {
-            return self.finish(wo, cosine_hemisphere(u), false);
-        }
-        end += choice.through;
-        if u_lobe < end {
-            let Some(lobe) = &self.lobe else {
-                let a = self.dielectric_albedo(self.gloss(wo.z));
-                let weight = self.transmitted * ((1.0 - a) / choice.through);
-                return Some(BsdfSample::straight(wo, weight));
-            };
-            return self.finish(wo, gloss_direction(lobe), true);
-        }
-        let lobe = self.lobe.as_ref()?;
-        end += choice.returned;
-        if u_lobe < end {
-            return self.finish(wo, lobe.albedo.sample_returned(u), false);
-        }
-        if choice.through_returned > 0.0 {
-            return self.finish(wo, lobe.albedo.sample_returned(u), true);
-        }
-        None
+        let left = stretched(u_lobe, end, to);
+        let through = left >= share;
+        let left = if through { stretched(left, share, 1.0) } else { stretched(left, 0.0, share) };
+        let wi = lobe.albedo.sample_returned(Vec2::new(left, fresh(u)));
+        self.finish(wo, wi, None, through)
     }
 
     /// The sample of the direction `wi` above the surface, or of its mirror image `through` it.
     #[inline]
-    fn finish(&self, wo: Vec3, wi: Vec3, through: bool) -> Option<BsdfSample> {
+    fn finish(&self, wo: Vec3, wi: Vec3, m: Option<Vec3>, through: bool) -> Option<BsdfSample> {
         if wi.z <= 0.0 {
             return None;
         }
         let wi = if through { wi.with_z(-wi.z) } else { wi };
-        BsdfSample::evaluated(wi, self.evaluate(wo, wi), through, 1.0)
+        BsdfSample::evaluated(wi, self.evaluate(wo, wi, m), through, 1.0)
     }
 
     #[inline]
@@ -198,35 +272,40 @@ impl<'t> Principled<'t> {
             return BsdfValue::ZERO;
         }
         if wo.z > 0.0 {
-            self.evaluate(wo, wi)
+            self.evaluate(wo, wi, None)
         } else {
-            self.evaluate(wo.with_z(-wo.z), wi.with_z(-wi.z))
+            self.evaluate(wo.with_z(-wo.z), wi.with_z(-wi.z), None)
         }
     }
 
-    /// Evaluates for `wo.z > 0` and `wi` on either side.
+    /// Evaluates for `wo.z > 0` and `wi` on either side; `m` is the half vector of a reflection, where it is known.
     #[inline]
-    fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfValue {
+    fn evaluate(&self, wo: Vec3, wi: Vec3, m: Option<Vec3>) -> BsdfValue {
         let choice = self.choice(wo.z);
         let mu_i = wi.z.abs();
         // Both sides have the geometry of a reflection.
         let mirrored = wi.with_z(mu_i);
         let cosine = mu_i * FRAC_1_PI;
-        // D V μ_i, the weight of Schlick's term, `returned_f_cos`, and the two densities.
-        let (single, weight, returned, pdf, returned_pdf) = match &self.lobe {
+        // D V μ_i, the cosine at the facet, `returned_f_cos`, and the two densities.
+        let (single, cos, returned, pdf, returned_pdf) = match &self.lobe {
             Some(lobe) => {
                 let ggx = lobe.ggx();
-                let m = (wo + mirrored).normalize_or_zero();
-                (
-                    ggx.d(m) * ggx.v_cos(wo.z, mu_i),
-                    schlick_weight(wo.dot(m)),
-                    lobe.returned_f_cos(lobe.lost(wo.z), mu_i),
-                    ggx.reflection_pdf(wo, m),
-                    lobe.albedo.returned_pdf(mu_i),
-                )
+                let m = m.unwrap_or_else(|| (wo + mirrored).normalize_or_zero());
+                let single = ggx.d(m) * ggx.v_cos(wo.z, mu_i);
+                let lost = lobe.lost(wo.z);
+                let returned = lobe.returned_f_cos(lost, mu_i);
+                let (pdf, returned_pdf) = match choice.returned {
+                    Some(_) => (single, lost * lobe.albedo.returned_pdf(mu_i)),
+                    None => (ggx.reflection_pdf(wo, m), 0.0),
+                };
+                (single, wo.dot(m), returned, pdf, returned_pdf)
             }
-            None => (0.0, 0.0, 0.0, 0.0, 0.0),
+            None => (0.0, 1.0, 0.0, 0.0, 0.0),
         };
+        let (weight, reflects) = (schlick_weight(cos), self.reflects(cos));
+        let (reflected, through) = self.facet(cos);
+        let by_facet = choice.by_facet;
+        let (p, share) = (1.0 - choice.diffuse, choice.returned.unwrap_or(1.0));
         if wi.z > 0.0 {
             let f = self.f0 + (Rgb::ONE - self.f0) * weight;
             let a_o = self.dielectric_albedo(self.gloss(wo.z));
@@ -234,13 +313,21 @@ impl<'t> Principled<'t> {
             let base = (1.0 - a_o) * (1.0 - a_i) / (1.0 - self.mean_dielectric_albedo()) * cosine;
             BsdfValue {
                 f_cos: f * single + self.diffuse * base + self.returned * returned,
-                pdf: choice.gloss * pdf + choice.diffuse * cosine + choice.returned * returned_pdf,
+                pdf: by_facet
+                    * (reflected * single
+                        + choice.base_by_facet * cosine
+                        + mean(self.returned) * returned_pdf)
+                    + (1.0 - by_facet)
+                        * (choice.diffuse * cosine + p * (reflects * pdf + share * returned_pdf)),
             }
         } else {
             let f = self.f0_dielectric + (1.0 - self.f0_dielectric) * weight;
             BsdfValue {
                 f_cos: self.transmitted * ((1.0 - f) * single + returned),
-                pdf: choice.through * pdf + choice.through_returned * returned_pdf,
+                pdf: by_facet * (through * single + mean(self.transmitted) * returned_pdf)
+                    + (1.0 - by_facet)
+                        * p
+                        * ((1.0 - reflects) * pdf + (1.0 - share) * returned_pdf),
             }
         }
     }

@@ -22,8 +22,8 @@
 
 use super::energy::AlbedoAt;
 use super::fresnel::{dielectric, dielectric_reflectance};
-use super::ggx::{Ggx, reflect, refract};
-use super::{BsdfSample, BsdfValue, TransportMode};
+use super::ggx::{Ggx, SMOOTH_BELOW_ALPHA, reflect, refract};
+use super::{BsdfSample, BsdfValue, TransportMode, fresh, stretched};
 use crate::description::Rgb;
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -33,6 +33,8 @@ use std::f32::consts::FRAC_1_PI;
 pub struct RoughDielectric<'t> {
     /// Index inside (z < 0) over the index outside.
     eta: f32,
+    /// Share of the refracted light that each crossing lets through.
+    tint: Rgb,
     /// Losses of a single bounce: from outside, from inside.
     lost: AlbedoAt<'t, 2>,
     /// Mean losses: from outside, from inside.
@@ -42,10 +44,22 @@ pub struct RoughDielectric<'t> {
 }
 
 impl<'t> RoughDielectric<'t> {
-    /// The transmitted lobe is about `|η − 1| α` wide. Below this width a half vector of `o + η t`, which
-    /// carries the rounding error 10⁻⁷ of its terms, no longer resolves it (to 10⁻³), and the
-    /// interface is taken as smooth.
-    pub(crate) const SMOOTH_BELOW_WIDTH: f32 = 1e-4;
+    /// The transmitted lobe is about `|η − 1| α` wide. Below the width at which reflected lobes end, a half vector of
+    /// `o + η t`, which carries the same rounding error, no longer resolves it, and the interface is taken as smooth.
+    pub(crate) fn resolves(eta: f32, alpha: f32) -> bool {
+        (eta - 1.0).abs() * alpha >= SMOOTH_BELOW_ALPHA
+    }
+
+    /// Index inside over the index outside.
+    #[inline]
+    pub(super) fn eta(&self) -> f32 {
+        self.eta
+    }
+
+    #[inline]
+    pub(super) fn tint(&self) -> Rgb {
+        self.tint
+    }
 
     /// Width of the microfacets.
     #[inline]
@@ -63,7 +77,12 @@ impl<'t> RoughDielectric<'t> {
         let inside = outside / ratio;
         let returned_transmission =
             if mean_lost.iter().all(|&l| l > 0.0) { [outside, inside] } else { [0.0; 2] };
-        Self { eta, lost, mean_lost, returned_transmission }
+        Self { eta, tint: Rgb::ONE, lost, mean_lost, returned_transmission }
+    }
+
+    /// The same interface with a tint, per channel in `[0, 1]`.
+    pub(crate) fn tinted(self, tint: Rgb) -> Self {
+        Self { tint, ..self }
     }
 
     /// The same interface at another index of refraction, near that of its table.
@@ -91,38 +110,33 @@ impl<'t> RoughDielectric<'t> {
         let behind = wo.z < 0.0;
         let (side, eta) = self.side(wo);
         let wo = wo.with_z(wo.z.abs());
-        let lost = self.lost.value(wo.z)[side];
-        let wi = if u_lobe < lost {
-            let transmit = u_lobe < lost * self.returned_transmission[side];
-            let wi = self.lost.sample_returned(u);
-            if transmit { wi.with_z(-wi.z) } else { wi }
+        let ggx = Ggx { alpha: self.lost.alpha() };
+        let m = ggx.sample_visible(wo, u);
+        let cos = wo.dot(m);
+        // Facets drawn are seen from the front but for rounding at the far corner of the square.
+        if cos <= 0.0 {
+            return None;
+        }
+        let f = dielectric(cos, wo.cross(m).length_squared(), eta).reflectance;
+        // What does not get out is what returns later: the one happens as often as the other is worth.
+        let (wi, out, from, to) = if u_lobe < f {
+            let wi = reflect(wo, m);
+            (wi, ggx.gets_out(wo, wi), 0.0, f)
         } else {
-            let u_lobe = (u_lobe - lost) / (1.0 - lost);
-            let m = Ggx { alpha: self.lost.alpha() }.sample_visible(wo, u);
-            let cos = wo.dot(m);
-            // Facets drawn are seen from the front but for rounding at the far corner of the square.
-            if cos <= 0.0 {
-                return None;
-            }
-            if u_lobe < dielectric(cos, wo.cross(m).length_squared(), eta).reflectance {
-                let wi = reflect(wo, m);
-                if wi.z <= 0.0 {
-                    return None;
-                }
-                wi
-            } else {
-                let wi = refract(wo, m, eta).normalize();
-                if wi.z >= 0.0 {
-                    return None;
-                }
-                wi
-            }
+            let wi = refract(wo, m, eta).normalize();
+            (wi, ggx.gets_out(wo, wi.with_z(-wi.z)), f, 1.0)
+        };
+        let end = from + (to - from) * out;
+        let (wi, m) = if u_lobe < end {
+            (wi, Some(m))
+        } else {
+            (self.sample_returned(stretched(u_lobe, end, to), fresh(u), side), None)
         };
         if wi.z == 0.0 {
             return None;
         }
         let transmitted = wi.z < 0.0;
-        let value = self.evaluate_above(wo, wi, side, eta, mode);
+        let value = self.evaluate_above((wo, wi, m), side, eta, mode);
         let eta = if transmitted { eta } else { 1.0 };
         BsdfSample::evaluated(wi, value, transmitted, eta).map(|sample| sample.turned(behind))
     }
@@ -134,36 +148,45 @@ impl<'t> RoughDielectric<'t> {
         }
         let (side, eta) = self.side(wo);
         if wo.z > 0.0 {
-            self.evaluate_above(wo, wi, side, eta, mode)
+            self.evaluate_above((wo, wi, None), side, eta, mode)
         } else {
-            self.evaluate_above(wo.with_z(-wo.z), wi.with_z(-wi.z), side, eta, mode)
+            self.evaluate_above((wo.with_z(-wo.z), wi.with_z(-wi.z), None), side, eta, mode)
         }
     }
 
-    /// Evaluates for `wo.z > 0`, on whichever side that is.
+    /// A direction of the light of further bounces, on either side.
+    fn sample_returned(&self, u: f32, azimuth: f32, side: usize) -> Vec3 {
+        let t = self.returned_transmission[side];
+        if u < t {
+            let wi = self.lost.sample_returned(Vec2::new(stretched(u, 0.0, t), azimuth));
+            wi.with_z(-wi.z)
+        } else {
+            self.lost.sample_returned(Vec2::new(stretched(u, t, 1.0), azimuth))
+        }
+    }
+
+    /// Evaluates for `wo.z > 0`, on whichever side that is; `m` is the facet, where it is known.
     fn evaluate_above(
         &self,
-        wo: Vec3,
-        wi: Vec3,
+        (wo, wi, m): (Vec3, Vec3, Option<Vec3>),
         side: usize,
         eta: f32,
         mode: TransportMode,
     ) -> BsdfValue {
         let lost = self.lost.value(wo.z)[side];
         let t = self.returned_transmission[side];
-        let (value, pdf) = if wi.z > 0.0 {
-            let (value, pdf) = self.reflected_once(wo, wi, eta);
+        let (f_cos, pdf) = if wi.z > 0.0 {
+            let once = self.reflected_once(wo, wi, m, eta);
             let returned = (1.0 - t) * self.returned(lost, wi.z, side);
             let returned_pdf = (1.0 - t) * self.lost.returned_pdf(wi.z);
-            (value + returned, (1.0 - lost) * pdf + lost * returned_pdf)
+            (Rgb::splat(once + returned), once + lost * returned_pdf)
         } else {
-            let (value, pdf) = self.transmitted_once(wo, wi, eta);
+            let once = self.transmitted_once(wo, wi, m, eta);
             let returned = t * self.returned(lost, -wi.z, 1 - side);
-            let value = (value + returned) * mode.transmission_factor(eta);
-            let returned_pdf = t * self.lost.returned_pdf(-wi.z);
-            (value, (1.0 - lost) * pdf + lost * returned_pdf)
+            let value = (once + returned) * mode.transmission_factor(eta);
+            (self.tint * value, once + lost * t * self.lost.returned_pdf(-wi.z))
         };
-        BsdfValue { f_cos: Rgb::splat(value), pdf }
+        BsdfValue { f_cos, pdf }
     }
 
     /// `(1 − E_o)(1 − E_i) μ_i / (π ℓ_i)` for `wi` on the side `side`.
@@ -176,30 +199,31 @@ impl<'t> RoughDielectric<'t> {
         }
     }
 
-    /// `f μ_i` and density of a single reflection.
+    /// `f μ_i` of a single reflection, which is also the density with which it is drawn.
     #[inline]
-    fn reflected_once(&self, wo: Vec3, wi: Vec3, eta: f32) -> (f32, f32) {
+    fn reflected_once(&self, wo: Vec3, wi: Vec3, m: Option<Vec3>, eta: f32) -> f32 {
         let ggx = Ggx { alpha: self.lost.alpha() };
-        let m = (wo + wi).normalize_or_zero();
+        let m = m.unwrap_or_else(|| (wo + wi).normalize_or_zero());
         let f = dielectric_reflectance(wo.dot(m).clamp(0.0, 1.0), eta);
-        (f * ggx.d(m) * ggx.v_cos(wo.z, wi.z), f * ggx.reflection_pdf(wo, m))
+        f * ggx.d(m) * ggx.v_cos(wo.z, wi.z)
     }
 
-    /// `f μ_i` (share of the power) and density of a single refraction.
+    /// `f μ_i` (share of the power) of a single refraction, which is also its density.
     #[inline]
-    fn transmitted_once(&self, wo: Vec3, wi: Vec3, eta: f32) -> (f32, f32) {
+    fn transmitted_once(&self, wo: Vec3, wi: Vec3, m: Option<Vec3>, eta: f32) -> f32 {
         let ggx = Ggx { alpha: self.lost.alpha() };
-        let m = (wo + eta * wi).normalize_or_zero();
-        let m = if m.z < 0.0 { -m } else { m };
+        let m = m.unwrap_or_else(|| {
+            let m = (wo + eta * wi).normalize_or_zero();
+            if m.z < 0.0 { -m } else { m }
+        });
         let (cos_o, cos_t) = (wo.dot(m), wi.dot(m));
         // A facet seen from its back refracts nothing (or m is 0: no facet refracts so).
         if cos_o <= 0.0 || cos_t >= 0.0 {
-            return (0.0, 0.0);
+            return 0.0;
         }
         let transmitted = 1.0 - dielectric_reflectance(cos_o.min(1.0), eta);
         let scale = cos_o + eta * cos_t;
         let jacobian = eta * eta * -cos_t / (scale * scale);
-        let f_cos = transmitted * ggx.d(m) * 4.0 * ggx.v_cos(wo.z, -wi.z) * cos_o * jacobian;
-        (f_cos, transmitted * ggx.visible_pdf(wo, m) * jacobian)
+        transmitted * ggx.d(m) * 4.0 * ggx.v_cos(wo.z, -wi.z) * cos_o * jacobian
     }
 }

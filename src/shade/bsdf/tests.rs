@@ -84,9 +84,10 @@ fn zoo(tables: &Tables) -> Vec<Bsdf<'_>> {
     let mut all = vec![
         Bsdf::Diffuse(Diffuse { albedo: color }),
         Bsdf::Mirror(Mirror { reflectance: color }),
-        Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.5 }),
+        Bsdf::SmoothDielectric(SmoothDielectric::new(1.5)),
         Bsdf::ThinGlass(ThinGlass { eta: 1.5, tint: color }),
         Bsdf::SmoothConductor(SmoothConductor { fresnel: GOLD }),
+        Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.5, tint: color }),
         metal(GOLD, 0.1),
         metal(GOLD, 0.6),
         metal(ConductorFresnel::Schlick { f0: color }, 1.0),
@@ -118,8 +119,8 @@ fn furnace(bsdf: &Bsdf, wo: Vec3, mode: TransportMode, n: u32) -> Rgb {
 }
 
 /// Pearson's χ² for every model, viewer and side; family level 0.01 after Šidák. And the integral of
-/// the density is the share of draws which are neither deltas nor `None`: within 4 standard errors,
-/// and 1 for Lambert to the precision of the quadrature.
+/// the density is the share of draws which are neither deltas nor `None`: within 4 standard errors and the precision of
+/// the tables which hold how often light returns, and 1 for Lambert to the precision of the quadrature.
 #[test]
 fn samples_follow_their_pdf() {
     let tables = Tables::new(1.5, &[0.1, 0.5]);
@@ -143,7 +144,7 @@ fn samples_follow_their_pdf() {
             let share = f64::from(drawn) / f64::from(n);
             let sigma = (integral * (1.0 - integral)).max(0.0).sqrt() / f64::from(n).sqrt();
             assert!(
-                (share - integral).abs() < 4.0 * sigma + 1e-4,
+                (share - integral).abs() < 4.0 * sigma + 1e-3,
                 "wo = {wo}: ∫pdf = {integral}, drawn {share}, {bsdf:?}"
             );
             if let Bsdf::Diffuse(_) = bsdf {
@@ -332,7 +333,7 @@ fn the_albedo_is_what_a_furnace_measures() {
 #[test]
 fn a_camera_in_glass_sees_the_outside_brighter() {
     let tables = Tables::new(1.5, &[0.001]);
-    let smooth = Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.5 });
+    let smooth = Bsdf::SmoothDielectric(SmoothDielectric::new(1.5));
     for (bsdf, tolerance) in [(smooth, 1e-3), (tables.glasses().next().unwrap(), 3e-3)] {
         for (mode, expected) in [(TransportMode::Radiance, 2.16), (TransportMode::Importance, 0.96)]
         {
@@ -373,7 +374,7 @@ fn radiance_and_power_differ_by_the_squared_index() {
 fn a_lobe_without_weight_is_never_chosen() {
     let black_base = smooth_plastic(Rgb::ZERO, 1.5);
     let no_coat = smooth_plastic(Rgb::ONE, 1.0);
-    let no_glass = Bsdf::SmoothDielectric(SmoothDielectric { eta: 1.0 });
+    let no_glass = Bsdf::SmoothDielectric(SmoothDielectric::new(1.0));
     let metal = principled(Rgb::ONE, 1.0, None, 1.0);
     let wo = direction(0.6, 2.0);
     for u_lobe in [0.0, 0.5, 1.0_f32.next_down()] {
@@ -383,6 +384,127 @@ fn a_lobe_without_weight_is_never_chosen() {
             assert!(sample(&no_coat).is_none_or(|sample| !sample.delta));
             assert!(sample(&no_glass).unwrap().transmitted);
             assert!(sample(&metal).is_none_or(|sample| !sample.transmitted));
+        }
+    }
+}
+
+/// White of every model, at one width.
+fn white_zoo(tables: &Tables, alpha: f32) -> Vec<Bsdf<'_>> {
+    let mut all = vec![metal(WHITE_METAL, alpha)];
+    all.extend(tables.plastics(Rgb::ONE));
+    all.extend(tables.glasses());
+    for (metallic, transmission) in [(0.0, 0.0), (1.0, 0.0), (0.5, 0.5), (0.0, 1.0)] {
+        all.push(principled(Rgb::ONE, metallic, Some(alpha), transmission));
+    }
+    all
+}
+
+/// In a white world every path brings 1 if its draws are worth 1 each. They are spread by less than a quarter, and the most that one is
+/// worth is 1.7; for glass narrower than 0.1, where one draw in a thousand returns from a second facet, it is 3.2. Drawn
+/// by the cosine and by tables alone they were spread by 1, up to 3.2, and up to 6.7 where a facet reflects
+/// more than the mean: five bounces inside of frosted glass made 300 of that.
+#[test]
+fn no_draw_in_a_white_world_is_worth_far_more_than_one() {
+    for alpha in [0.01, 0.1, 0.3, 0.6, 1.0] {
+        let tables = Tables::new(1.5, &[alpha]);
+        for bsdf in white_zoo(&tables, alpha) {
+            let glass = matches!(bsdf, Bsdf::RoughDielectric(_));
+            let most = if glass && alpha < 0.1 { 3.2 } else { 1.7 };
+            for wo in viewers().filter(|wo| glass || wo.z > 0.0) {
+                let (mut sum, mut squares) = (0.0, 0.0);
+                let n = 4000;
+                for (u_lobe, u) in even_points(n) {
+                    let sample = bsdf.sample(wo, u_lobe, u, TransportMode::Importance);
+                    let weight = f64::from(sample.map_or(0.0, |sample| sample.weight.x));
+                    assert!(weight < most, "α = {alpha}, {wo}: {weight} {bsdf:?}");
+                    (sum, squares) = (sum + weight, squares + weight * weight);
+                }
+                let mean = sum / f64::from(n);
+                let spread = (squares / f64::from(n) - mean * mean).max(0.0).sqrt();
+                assert!(spread < 0.25, "α = {alpha}, {wo}: {spread} {bsdf:?}");
+            }
+        }
+    }
+}
+
+/// Widths down to the last one which is not smooth, with those to either side of 10⁻³.
+const NARROW: [f32; 7] = [SMOOTH_BELOW_ALPHA, 2e-6, 1e-5, 1e-4, 9.61e-4, 1.005e-3, 1e-2];
+
+/// A facet of the slope `tan θ = α √(s/(1 − s))`: a share `s` of all is less steep.
+fn facet(alpha: f32, s: f64, phi: f64) -> glam::DVec3 {
+    let t = f64::from(alpha) * (s / (1.0 - s)).sqrt();
+    glam::DVec3::new(t * phi.cos(), t * phi.sin(), 1.0).normalize()
+}
+
+/// Glass of index 1.5; its transmitted lobe is half as wide, and ends at twice the width.
+fn narrow_glass(tables: &Tables) -> Bsdf<'_> {
+    tables.glasses().next().expect("one was made")
+}
+
+/// Oracle: half of the facets of GGX are less steep than α, and of narrow lobes half of the visible ones. The half vectors of what is
+/// drawn, formed in f64, are so at every width, down to the end. Level: 4 standard errors and the square
+/// of the rounding relative to the width.
+#[test]
+fn lobes_are_as_wide_as_their_roughness_until_f32_ends() {
+    let n = 4000;
+    let wo = direction(0.8, 0.3);
+    for alpha in NARROW {
+        let tables = Tables::new(1.5, &[alpha]);
+        for bsdf in [metal(GOLD, alpha), narrow_glass(&tables)] {
+            let (mut within, mut all) = (0.0, 0.0);
+            for (u_lobe, u) in even_points(n) {
+                let sample = bsdf.sample(wo, u_lobe, u, TransportMode::Importance).unwrap();
+                let index = if sample.transmitted { 1.5 } else { 1.0 };
+                let m = wo.as_dvec3().normalize() + sample.wi.as_dvec3().normalize() * index;
+                let slope = m.x.hypot(m.y) / m.z.abs();
+                within += f64::from(slope < f64::from(alpha));
+                all += 1.0;
+            }
+            let bound = 2.0 / f64::from(n).sqrt() + 4.0 * f64::from(f32::EPSILON / alpha).powi(2);
+            let share: f64 = within / all;
+            assert!((share - 0.5).abs() < bound, "α = {alpha}: {share} {bsdf:?}");
+        }
+    }
+}
+
+/// Oracle: over facets drawn in f64, the mean of the density over the one with which their directions come is the integral of
+/// the density, which is the share of light that the lobe has, with directions rounded to f32.
+#[test]
+fn densities_of_narrow_lobes_integrate_to_their_share() {
+    let n = 4000;
+    let wo = direction(0.8, 0.3);
+    let o = wo.as_dvec3().normalize();
+    for alpha in NARROW {
+        let tables = Tables::new(1.5, &[alpha]);
+        let glass = narrow_glass(&tables);
+        let f = f64::from(fresnel::dielectric_reflectance(0.8, 1.5));
+        for (bsdf, eta, share) in
+            [(metal(GOLD, alpha), 1.0, 1.0), (glass, 1.0, f), (glass, 1.5, 1.0 - f)]
+        {
+            let sum: f64 = even_points(n)
+                .map(|(_, u)| {
+                    let m = facet(alpha, f64::from(u.x), std::f64::consts::TAU * f64::from(u.y));
+                    let a2 = f64::from(alpha).powi(2);
+                    let d = a2
+                        / (std::f64::consts::PI * (a2 * m.z * m.z + m.x * m.x + m.y * m.y).powi(2));
+                    let cos = o.dot(m);
+                    let (wi, jacobian) = if eta == 1.0 {
+                        (m * (2.0 * cos) - o, 0.25 / cos)
+                    } else {
+                        let cos_t = (1.0 - (1.0 - cos * cos) / (eta * eta)).sqrt();
+                        let wi = m * (cos / eta - cos_t) - o / eta;
+                        (wi, eta * eta * cos_t / (cos - eta * cos_t).powi(2))
+                    };
+                    let value = bsdf.evaluate(wo, wi.as_vec3(), TransportMode::Importance);
+                    f64::from(value.pdf) / (d * m.z * jacobian)
+                })
+                .sum();
+            let integral = sum / f64::from(n) / share;
+            let rounding = f64::from(f32::EPSILON / alpha).powi(2);
+            assert!(
+                (integral - 1.0).abs() < 3e-3 + 4.0 * rounding,
+                "α = {alpha}, η = {eta}: {integral} {bsdf:?}"
+            );
         }
     }
 }
@@ -413,7 +535,7 @@ fn the_narrowest_lobe_agrees_with_a_mirror() {
 #[test]
 fn smooth_interfaces_of_any_index_conserve_power() {
     for eta in [0.01, 0.5, 0.999_999, 1.0, 1.000_001, 1.5, 4.0, 100.0] {
-        let bsdf = Bsdf::SmoothDielectric(SmoothDielectric { eta });
+        let bsdf = Bsdf::SmoothDielectric(SmoothDielectric::new(eta));
         for k in 0..=200 {
             for z in [k as f32 / 200.0, -(k as f32) / 200.0, 1e-6, -1e-6, 1e-30, f32::MIN_POSITIVE]
             {
@@ -442,7 +564,7 @@ fn smooth_interfaces_of_any_index_conserve_power() {
 #[test]
 fn refraction_follows_snell() {
     for eta in [1.33, 1.5, 2.4] {
-        let bsdf = Bsdf::SmoothDielectric(SmoothDielectric { eta });
+        let bsdf = Bsdf::SmoothDielectric(SmoothDielectric::new(eta));
         for k in 1..90 {
             let theta = f64::from(k).to_radians();
             for side in [1.0, -1.0] {
@@ -542,7 +664,7 @@ fn the_share_of_the_mirror_image_is_the_one_that_is_drawn_by() {
         let wo = uniform_sphere(s.two(0));
         let eta = 0.6 + 1.4 * s.one(2);
         for bsdf in [
-            Bsdf::SmoothDielectric(SmoothDielectric { eta }),
+            Bsdf::SmoothDielectric(SmoothDielectric::new(eta)),
             Bsdf::ThinGlass(ThinGlass { eta, tint: Rgb::new(0.9, 0.5, 0.2) }),
         ] {
             let Some(p) = bsdf.first_of_two_deltas(wo) else {

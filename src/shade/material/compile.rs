@@ -27,6 +27,7 @@ pub(super) enum Kind {
         width: Width,
         average: f32,
         table: Option<u32>,
+        tint: Value<Rgb, u32>,
     },
     ThinGlass {
         eta: f32,
@@ -180,11 +181,12 @@ impl MaterialTable {
         match *material {
             Material::Diffuse { albedo } => Kind::Diffuse { albedo },
             Material::Mirror { reflectance } => Kind::Mirror { reflectance },
-            Material::Dielectric { ior, ref dispersion, roughness, .. } => {
+            Material::Dielectric { ior, ref dispersion, roughness, tint, .. } => {
                 let ior = index_at_d(ior, dispersion.as_ref());
                 let width = glass_width(ior, Width::new(roughness));
                 let table = known.glass(&mut self.glasses, ior, width);
-                Kind::Dielectric { eta: ior, width, average: dielectric_average(ior), table }
+                let average = dielectric_average(ior);
+                Kind::Dielectric { eta: ior, width, average, table, tint }
             }
             Material::ThinGlass { ior, tint } => Kind::ThinGlass { eta: ior, tint },
             Material::Conductor { metal, f0, eta, k, roughness } => {
@@ -211,16 +213,9 @@ impl MaterialTable {
     }
 }
 
-/// The width of a rough dielectric, or smooth where its transmitted lobe could not be resolved.
+/// The width of a rough dielectric, or smooth where its transmitted lobe can nowhere be resolved.
 pub(in crate::shade) fn glass_width(eta: f32, width: Width) -> Width {
-    let strength = (eta - 1.0).abs();
-    let resolved = match width {
-        Width::Smooth => false,
-        Width::Constant(alpha) => strength * alpha >= RoughDielectric::SMOOTH_BELOW_WIDTH,
-        // At the smallest width the texture can ask for.
-        Width::Texture(_) => strength * SMOOTH_BELOW_ALPHA >= RoughDielectric::SMOOTH_BELOW_WIDTH,
-    };
-    if resolved { width } else { Width::Smooth }
+    if RoughDielectric::resolves(eta, width.widest()) { width } else { Width::Smooth }
 }
 
 impl Kind {

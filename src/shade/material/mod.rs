@@ -188,12 +188,15 @@ impl MaterialTable {
             Kind::Mirror { reflectance } => {
                 Bsdf::Mirror(Mirror { reflectance: self.share(reflectance, at) })
             }
-            Kind::Dielectric { eta, width, average, table } => {
-                match self.alpha(*width, at).zip(*table) {
-                    None => Bsdf::SmoothDielectric(SmoothDielectric { eta: *eta }),
+            Kind::Dielectric { eta, width, average, table, tint } => {
+                let tint = self.share(tint, at);
+                let alpha = self.alpha(*width, at);
+                match alpha.filter(|&alpha| RoughDielectric::resolves(*eta, alpha)).zip(*table) {
+                    None => Bsdf::SmoothDielectric(SmoothDielectric { eta: *eta, tint }),
                     Some((alpha, table)) => {
                         let lost = self.glasses[table as usize].at(alpha);
-                        Bsdf::RoughDielectric(RoughDielectric::new(*eta, lost, *average))
+                        let rough = RoughDielectric::new(*eta, lost, *average);
+                        Bsdf::RoughDielectric(rough.tinted(tint))
                     }
                 }
             }
@@ -249,12 +252,12 @@ impl MaterialTable {
     ) -> Bsdf<'_> {
         let index = outside.and_then(|outside| self.interior(outside));
         match (index, &self.materials[material as usize].kind) {
-            (Some(index), Kind::Dielectric { eta, .. }) => {
-                let eta = eta / index.ior;
+            (Some(index), Kind::Dielectric { eta, tint, .. }) => {
+                let (eta, tint) = (eta / index.ior, self.share(tint, at));
                 let Some(pair) = self.relative.find(material, index.ior) else {
-                    return Bsdf::SmoothDielectric(SmoothDielectric { eta });
+                    return Bsdf::SmoothDielectric(SmoothDielectric { eta, tint });
                 };
-                pair.bsdf(eta, |texture| self.textures.scalar(texture, at))
+                pair.bsdf(eta, tint, |texture| self.textures.scalar(texture, at))
             }
             _ => self.chosen_bsdf(material, at),
         }
@@ -276,8 +279,8 @@ impl MaterialTable {
         let index = |solid: u32| self.index(solid, nm);
         let eta = |outside: Option<u32>| index(material) / outside.map_or(1.0, index);
         match bsdf {
-            Bsdf::SmoothDielectric(_) => {
-                Bsdf::SmoothDielectric(SmoothDielectric { eta: eta(outside) })
+            Bsdf::SmoothDielectric(smooth) => {
+                Bsdf::SmoothDielectric(SmoothDielectric { eta: eta(outside), ..smooth })
             }
             Bsdf::RoughDielectric(rough) => Bsdf::RoughDielectric(rough.with_index(eta(outside))),
             other => other,
@@ -316,11 +319,14 @@ impl MaterialTable {
         Some(Medium { sigma_s, sigma_t, emission, phase })
     }
 
-    /// Whether a smooth surface with equal indices on both sides, at all wavelengths, is no surface: only what is inside
+    /// Whether a smooth surface without tint and with equal indices on both sides, at all wavelengths, is no surface: only what is inside
     /// matters.
     pub fn is_invisible(&self, material: u32, outside: Option<u32>) -> bool {
         let Compiled { kind, disperses, .. } = &self.materials[material as usize];
-        let Kind::Dielectric { eta, width: Width::Smooth, .. } = kind else { return false };
+        let Kind::Dielectric { eta, width: Width::Smooth, tint, .. } = kind else { return false };
+        if *tint != Value::Constant(Rgb::ONE) {
+            return false;
+        }
         let around = outside.and_then(|outside| self.interior(outside)).map_or(1.0, |i| i.ior);
         !disperses && outside.is_none_or(|outside| !self.disperses(outside)) && *eta == around
     }

@@ -20,6 +20,7 @@ fn glass(roughness: Value<f32, u32>, attenuation: Option<Attenuation>) -> Materi
         ior: 1.5,
         dispersion: None,
         roughness,
+        tint: Rgb::ONE.into(),
         attenuation,
         absorption: None,
         scattering: None,
@@ -222,6 +223,7 @@ fn a_prism_turns_each_line_by_its_angle() {
         ior: 1.5,
         dispersion,
         roughness: 0.0.into(),
+        tint: Rgb::ONE.into(),
         attenuation: None,
         absorption: None,
         scattering: None,
@@ -254,5 +256,37 @@ fn a_prism_turns_each_line_by_its_angle() {
             let error = deviation - expected.to_radians();
             assert!(error.abs() < 3e-6, "{line} nm at {incidence}°: off by {error} rad");
         }
+    }
+}
+
+/// The lobe is there down to where f32 ends, for constants and textures; of glass while the transmitted one can be resolved.
+#[test]
+fn only_what_f32_cannot_tell_is_smooth() {
+    let metal = |roughness: Value<f32, u32>| Material::Conductor {
+        metal: Some(Metal::Gold),
+        f0: None,
+        eta: None,
+        k: None,
+        roughness,
+    };
+    let textured = Value::Texture(0);
+    let materials = [
+        metal(0.031.into()),
+        metal(9.7e-4.into()),
+        glass(0.031.into(), None),
+        glass(1e-3.into(), None),
+        metal(textured),
+        glass(textured, None),
+    ];
+    let table = MaterialTable::new(&materials, two_texels(0.031, 9e-4));
+    let is_rough = |material, at: &TexturePoint| {
+        matches!(
+            table.chosen_bsdf(material, at),
+            Bsdf::RoughConductor(_) | Bsdf::RoughDielectric(_)
+        )
+    };
+    assert_eq!([0, 1, 2, 3].map(|material| is_rough(material, &HERE)), [true, false, true, false]);
+    for material in [4, 5] {
+        assert!(is_rough(material, &LEFT) && !is_rough(material, &RIGHT), "{material}");
     }
 }
