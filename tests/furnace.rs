@@ -296,7 +296,7 @@ fn no_shape_can_be_seen_in_an_even_sky() {
 
 /// Oracle: a coarse glass ball of 80 triangles with the normals of the sphere has no dark or bright
 /// rim: inside and outside are told by the triangle, not by the interpolated normal. The diffuse one
-/// is nowhere brighter than the sky.
+/// is as bright as the sky: what leaves below the horizon of a triangle is not lost.
 ///
 /// Nothing is lost: reflection about normals that are not the surface's does not keep volumes of phase space, so that some paths are
 /// drawn into closed orbits of total reflections (seen: one of twelve triangles), but they are let out.

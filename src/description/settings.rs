@@ -84,6 +84,9 @@ pub struct RenderSettings {
     /// What is done about textures which are finer than what a sample stands for. Trades sharpness at a slant and
     /// time for noise.
     pub texture_filter: TextureFiltering,
+    /// Where light ends on meshes with smooth normals. Trades shadows of what is nearer to a coarse mesh than its
+    /// triangles are to the round form they stand for, for an edge of light without steps.
+    pub terminator: Terminator,
     /// Exposure in stops: the picture is multiplied by `2^exposure` before the tone curve.
     pub exposure: f32,
     /// The tone curve of the PNG; the EXR stays linear.
@@ -121,6 +124,7 @@ impl Default for RenderSettings {
             dicing: 1.0,
             dicing_memory: 1024,
             texture_filter: TextureFiltering::default(),
+            terminator: Terminator::default(),
             exposure: 0.0,
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],
@@ -151,6 +155,16 @@ impl RenderSettings {
         let Development { exposure, tonemap } = Development::default();
         Self { exposure, tonemap, ..self.clone() }
     }
+}
+
+/// Where light ends on meshes with smooth normals.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Terminator {
+    /// Where the smooth normals turn away from it: what is reflected leaves from the round surface that they mean.
+    #[default]
+    Smooth,
+    /// Where the triangles turn away from it, or shadow each other.
+    Faceted,
 }
 
 /// The integrators by name.

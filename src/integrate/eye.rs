@@ -332,7 +332,8 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             context.counters.truncated += 1;
             return false;
         }
-        let vertex = Vertex::new(surface, wo, bsdf);
+        let ray_origin = scene.ray_origin(&walk.ray, hit, &surface, &bsdf);
+        let vertex = Vertex::new(surface, ray_origin, wo, bsdf);
         let sides = Sides { here: walk.inside, beyond };
         let receiver = vertex.receiver();
         let storable = bsdf.is_storable(self.settings.min_alpha());
@@ -570,8 +571,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         } else {
             Arrival::Drawn { from: *receiver, pdf: drawn.pdf }
         };
-        let surface = &vertex.surface;
-        walk.ray.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
+        walk.ray.o = vertex.ray_origin.towards(wi);
         walk.ray.d = wi;
     }
 

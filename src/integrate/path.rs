@@ -322,7 +322,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             if SHARE {
                 path.land(&surface, wo, &bsdf);
             }
-            let vertex = Vertex::new(surface, wo, bsdf);
+            let ray_origin = self.scene.ray_origin(&path.ray, &hit, &surface, &bsdf);
+            let vertex = Vertex::new(surface, ray_origin, wo, bsdf);
             let sides = Sides { here: path.inside, beyond };
             let mut receiver = vertex.receiver();
             let (to_scatter, on_light) =
@@ -353,8 +354,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                     break;
                 }
             }
-            let SurfacePoint { p, p_error, ng, .. } = vertex.surface;
-            path.ray.o = offset_ray_origin(p, p_error, ng, wi);
+            path.ray.o = vertex.ray_origin.towards(wi);
             path.ray.d = wi;
             path.arrival = if sample.delta {
                 Arrival::Sure

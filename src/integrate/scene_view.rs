@@ -1,12 +1,16 @@
 //! The tables of a frame, together, as an integrator sees them.
 
-use crate::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
+use crate::build::bvh::{Hit, MeshTrees, RayOrigin, SceneGeometry, SurfacePoint, TopLevel};
 use crate::build::density::Densities;
 use crate::build::light::{LightTable, Lights, ShapeLights};
 use crate::build::nesting::{NestedGeometry, Solids};
 use crate::build::spectra::Spectra;
 use crate::color::spectrum;
+use crate::description::Terminator;
 use crate::extract::{Instances, PunctualLights, Requirements, Surfaces, ViewCamera};
+use crate::math::Ray;
+use crate::shade::Bsdf;
+use crate::world::Settings;
 use bevy_ecs::prelude::*;
 use bevy_ecs::system::SystemParam;
 
@@ -25,6 +29,7 @@ pub struct SceneTables<'w> {
     solids: Res<'w, Solids>,
     densities: Res<'w, Densities>,
     spectra: Res<'w, Spectra>,
+    settings: Res<'w, Settings>,
 }
 
 /// The scene of a frame: arrays and indices, read-only.
@@ -46,6 +51,8 @@ pub struct SceneView<'a> {
     pub densities: &'a Densities,
     /// The surfaces at each set of wavelengths, in a spectral scene.
     pub spectra: &'a [Surfaces],
+    /// Where light ends on meshes with smooth normals.
+    pub terminator: Terminator,
 }
 
 impl<'a> SceneView<'a> {
@@ -59,6 +66,24 @@ impl<'a> SceneView<'a> {
         let surfaces = &self.spectra[spectrum::set_of(sample)];
         let lights = Lights { materials: &surfaces.materials, ..self.lights };
         Self { surfaces, lights, ..self }
+    }
+
+    /// Where rays leave what scatters where a ray hit.
+    ///
+    /// What is let through leaves on the far side of the triangle, and both sides have one point there.
+    #[inline]
+    pub fn ray_origin(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        bsdf: &Bsdf,
+    ) -> RayOrigin {
+        let smooth = self.terminator == Terminator::Smooth && !bsdf.transmits();
+        smooth
+            .then(|| self.geometry.smooth_ray_origin(ray, hit, surface))
+            .flatten()
+            .unwrap_or_else(|| surface.into())
     }
 
     /// What rays meet which know what they are inside of.
@@ -96,6 +121,7 @@ impl SceneTables<'_> {
             solids: &self.solids,
             densities: &self.densities,
             spectra: &self.spectra.surfaces,
+            terminator: self.settings.0.terminator,
         }
     }
 }

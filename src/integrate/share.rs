@@ -79,7 +79,7 @@ impl Landing {
         if !matches!(bsdf, Bsdf::Diffuse(_)) || wo.dot(ns) <= 0.0 {
             return None;
         }
-        let to = p - departure.vertex.surface.p;
+        let to = p - departure.vertex.ray_origin.p;
         let density = f64::from(departure.pdf) * area_per_solid_angle(to, wo.dot(ng));
         (density > 0.0 && density.is_finite()).then_some(Self {
             p,
@@ -165,7 +165,7 @@ impl<const OPACITY: bool, I: Inside> PathTracer<'_, OPACITY, I> {
         landing: &Landing,
         counters: &mut PathCounters,
     ) -> Option<Connection> {
-        let to = landing.p - from.vertex.surface.p;
+        let to = landing.p - from.vertex.ray_origin.p;
         let wi = to.as_vec3().try_normalize()?;
         let cos = -wi.dot(landing.ng);
         if cos <= 0.0 || -wi.dot(landing.ns) <= 0.0 {

@@ -1,9 +1,11 @@
 //! A point on a path: where a surface was met, how it scatters, and which side is which.
 //!
 //! Which side of a surface a direction leaves by is decided by the geometric normal. The shading
-//! normal shapes the BSDF; a direction which ends up on the wrong side is thrown back: [`ShadedBsdf`].
+//! normal shapes the BSDF; a direction which ends up on the wrong side is thrown back: [`ShadedBsdf`]. Where
+//! rays leave a mesh from the round surface that its smooth normals mean, their normal takes the place of
+//! the geometric one.
 
-use crate::build::bvh::SurfacePoint;
+use crate::build::bvh::{RayOrigin, SurfacePoint};
 use crate::build::light::Receiver;
 use crate::description::Rgb;
 use crate::math::Frame;
@@ -30,22 +32,33 @@ impl<I> Sides<I> {
 #[derive(Clone)]
 pub(super) struct Vertex<'a> {
     pub(super) surface: SurfacePoint,
+    /// Where rays leave it.
+    pub(super) ray_origin: RayOrigin,
     pub(super) frame: Frame,
     pub(super) wo: Vec3,
     pub(super) bsdf: Bsdf<'a>,
 }
 
 impl<'a> Vertex<'a> {
-    pub(super) fn new(mut surface: SurfacePoint, wo: Vec3, bsdf: Bsdf<'a>) -> Self {
+    pub(super) fn new(
+        mut surface: SurfacePoint,
+        mut ray_origin: RayOrigin,
+        wo: Vec3,
+        bsdf: Bsdf<'a>,
+    ) -> Self {
         // Seen from beyond its horizon a shading normal cannot say what is reflected where.
-        if wo.dot(surface.ns) * wo.dot(surface.ng) <= 0.0 {
-            surface.ns = surface.ng;
+        let is_beyond = |n: Vec3| wo.dot(n) * wo.dot(surface.ng) <= 0.0;
+        if is_beyond(ray_origin.n) {
+            ray_origin = RayOrigin::from(&surface);
         }
-        Self { surface, frame: surface.frame(), wo, bsdf }
+        if is_beyond(surface.ns) {
+            surface.ns = ray_origin.n;
+        }
+        Self { surface, ray_origin, frame: surface.frame(), wo, bsdf }
     }
 
     pub(super) fn receiver(&self) -> Receiver {
-        let SurfacePoint { p, p_error, ng, ns, .. } = self.surface;
+        let (RayOrigin { p, p_error, n: ng }, ns) = (self.ray_origin, self.surface.ns);
         let facing = if self.wo.dot(ns) < 0.0 { -ns } else { ns };
         let horizon = (!self.bsdf.transmits()).then_some(facing);
         Receiver { p, p_error, ng, facing, horizon, draws_both: false }
@@ -54,8 +67,8 @@ impl<'a> Vertex<'a> {
     /// How it scatters.
     #[inline]
     pub(super) fn shaded(&self) -> ShadedBsdf<'_, 'a> {
-        let Self { surface, frame, wo, bsdf } = self;
-        ShadedBsdf { bsdf, frame, ng: surface.ng, wo: *wo }
+        let Self { ray_origin, frame, wo, bsdf, .. } = self;
+        ShadedBsdf { bsdf, frame, ng: ray_origin.n, wo: *wo }
     }
 
     /// Whether `wi` leaves on the other side of the surface than the path arrived from.

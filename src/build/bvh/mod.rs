@@ -16,6 +16,7 @@ mod resting;
 mod spheres;
 mod surface;
 mod tangents;
+mod terminator;
 #[cfg(test)]
 mod tests;
 mod texture_point;
@@ -28,6 +29,7 @@ pub use mesh_tree::{MeshTree, MeshTrees, rebuild_mesh_trees};
 pub use resting::{RestingTree, join_resting_meshes};
 pub use surface::SurfacePoint;
 pub use tangents::Tangents;
+pub use terminator::RayOrigin;
 pub use top::{TopLevel, rebuild_top_level};
 pub(crate) use tree::Bvh;
 pub use wide::{MovingTree, TriangleHit, WideTree};

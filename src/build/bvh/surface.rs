@@ -159,7 +159,8 @@ impl MeshTree {
 
 /// A point of a triangle, with what follows from the corners alone.
 pub(super) struct Facet {
-    p: DVec3,
+    pub(super) p: DVec3,
+    a: DVec3,
     /// Normal of any positive length.
     pub(super) ng: DVec3,
     e1: DVec3,
@@ -181,7 +182,12 @@ impl Facet {
         let ng = e1.cross(e2);
         let p = a * (1.0 - weights.x - weights.y) + b * weights.x + c * weights.y;
         let error = a.abs().max(b.abs()).max(c.abs()).max_element() * gamma_f64(48);
-        Self { p, ng, e1, e2, error }
+        Self { p, a, ng, e1, e2, error }
+    }
+
+    /// The corners.
+    pub(super) fn corners(&self) -> [DVec3; 3] {
+        [self.a, self.a + self.e1, self.a + self.e2]
     }
 
     /// Texture coordinates, the direction in which u grows, and the colour.
