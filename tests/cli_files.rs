@@ -373,6 +373,21 @@ fn warnings_are_told_once_and_not_for_every_frame() {
     }
 }
 
+/// Before the first frame, and again at the end.
+#[test]
+fn a_render_says_which_integrator_runs_and_why() {
+    let folder = folder();
+    let told = stderr(&render(folder.path(), &["--frames", "0-1"]));
+    let reason = "Path (Auto takes it: nothing casts caustics)";
+    assert_eq!(told.matches(reason).count(), 2, "{told}");
+    let start = told.find(&format!("integrator: {reason}\n")).expect("at the start");
+    let frame = told.find("frame 0 done").expect("a line for each frame");
+    let end = told.find(&format!("  integrator {reason}\n")).expect("in the summary");
+    assert!(start < frame && frame < end, "{told}");
+    let set = stderr(&render(folder.path(), &["--integrator", "sppm", "--fresh"]));
+    assert!(set.contains("integrator: Sppm (as the settings say)"), "{set}");
+}
+
 #[test]
 fn the_files_do_not_depend_on_the_number_of_threads() {
     let folder = folder();

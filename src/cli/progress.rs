@@ -134,8 +134,9 @@ impl Progress {
     pub fn method_listener(&self) -> MethodListener {
         let (view, told) = (self.view.clone(), self.told.clone());
         MethodListener::new(move |chosen| {
-            let text = format!("integrator: {}", method_in_words(chosen));
-            if told.add(&text) {
+            // The reason has numbers in it which change from frame to frame.
+            if told.add(&format!("integrator {}", chosen.method.name())) {
+                let text = format!("integrator: {}", method_in_words(chosen));
                 match &view {
                     View::Bars(bars) => bars.print(&text),
                     View::Lines => say(&text),

@@ -55,7 +55,7 @@ impl Summary {
         self.non_finite += entry.report.non_finite;
         self.saturated += entry.saturated;
         let integrator = &entry.report.integrator;
-        if !self.integrators.iter().any(|(_, known)| known == integrator) {
+        if !self.integrators.iter().any(|(_, known)| name_of(known) == name_of(integrator)) {
             self.integrators.push((entry.frame, integrator.clone()));
         }
         let textures = entry.report.table_bytes.iter().find(|(name, _)| *name == "textures");
@@ -113,7 +113,7 @@ impl Summary {
         };
         let stages: Vec<_> = self.stages.iter().map(stage).collect();
         lines.push(format!("  time     {}", stages.join(", ")));
-        lines.push(format!("  light    {}", self.integrators()));
+        lines.push(format!("  integrator {}", self.integrators()));
         lines.push(format!("  samples  {}", format::count(self.samples as f64)));
         lines.push(format!(
             "  rays     {} ({} rays/s)",
@@ -157,6 +157,11 @@ impl Summary {
             "peak_memory_bytes": peak_memory_bytes(), "out": folder.display().to_string(),
         })
     }
+}
+
+/// Of an integrator with its reason the name alone: the reason has numbers in it which change from frame to frame.
+fn name_of(integrator: &str) -> &str {
+    integrator.split_once(" (").map_or(integrator, |(name, _)| name)
 }
 
 /// Photons of all frames in one line.
