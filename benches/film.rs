@@ -6,7 +6,7 @@ use common::Uniforms;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{DVec3, Vec2, Vec3};
 use kinora::description::{Filter, Layer, ToneMap};
-use kinora::film::{Film, FilterSampler, FirstHit, PixelSample};
+use kinora::film::{Film, FilterSampler, FirstHit, PixelSample, Seen};
 use kinora::output::develop;
 use std::hint::black_box;
 
@@ -33,18 +33,20 @@ fn filter(c: &mut Criterion) {
 
 fn pixel_samples() -> Vec<PixelSample> {
     let mut uniforms = Uniforms::new(5);
-    let first_hit = |uniforms: &mut Uniforms| FirstHit {
-        albedo: uniforms.cube().abs(),
-        normal: uniforms.direction(),
-        depth: uniforms.one(),
-        position: DVec3::ONE,
-        motion: uniforms.square(),
-        object_id: 1 + (3.0 * uniforms.one()) as u32,
+    let seen = |uniforms: &mut Uniforms| {
+        let first_hit = FirstHit {
+            albedo: uniforms.cube().abs(),
+            normal: uniforms.direction(),
+            depth: uniforms.one(),
+            position: DVec3::ONE,
+            object_id: 1 + (3.0 * uniforms.one()) as u32,
+        };
+        Seen { first_hit: Some(first_hit), motion: uniforms.square() }
     };
     (0..SAMPLES)
         .map(|_| PixelSample {
             radiance: uniforms.cube().abs(),
-            first_hit: Some(first_hit(&mut uniforms)),
+            seen: Some(seen(&mut uniforms)),
             ..PixelSample::default()
         })
         .collect()

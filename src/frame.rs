@@ -4,10 +4,10 @@ use crate::build::bvh::{MeshTrees, RestingTree, TopLevel};
 use crate::build::density::Densities;
 use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
-use crate::description::SceneDescription;
+use crate::description::{Layer, SceneDescription};
 use crate::extract::{
-    ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Requirements,
-    Surfaces, ViewCamera, meshes_fit, method_suffices,
+    CameraFacts, ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances,
+    Requirements, Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError, Tile};
 use crate::integrate::{IntegrateStatus, PhotonReport};
@@ -20,7 +20,7 @@ use bevy_ecs::schedule::{
 };
 use bevy_ecs::system::ScheduleSystem;
 use serde::Serialize;
-use std::collections::TryReserveError;
+use std::collections::{BTreeMap, TryReserveError};
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -107,6 +107,8 @@ pub struct FrameReport {
     pub photons: Option<PhotonReport>,
     /// Which integrator ran.
     pub integrator: String,
+    /// The camera when the shutter opened and closed.
+    pub camera: CameraFacts,
     /// Things the user should know.
     pub warnings: Vec<String>,
 }
@@ -118,8 +120,8 @@ pub struct RenderedFrame {
     pub film: Film,
     /// What happened.
     pub report: FrameReport,
-    /// World to camera at shutter opening, column-major, for the EXR header.
-    pub world_to_camera: glam::DMat4,
+    /// The names of the objects by their numbers in the layer `ObjectId`; empty without that layer.
+    pub objects: BTreeMap<u32, String>,
 }
 
 /// Why a frame could not be rendered.
@@ -373,6 +375,7 @@ impl Simulation {
             truncated_paths: status.counters.truncated,
             photons: status.photons,
             integrator: self.integrator(),
+            camera: CameraFacts::new(self.world.resource(), self.world.resource()),
             warnings: self
                 .warnings()
                 .into_iter()
@@ -382,8 +385,17 @@ impl Simulation {
                 .chain(self.orbit_warning(status.counters.let_out, total))
                 .collect(),
         };
-        let world_to_camera = self.world.resource::<ViewCamera>().world_to_camera;
-        Ok(RenderedFrame { film, report, world_to_camera })
+        Ok(RenderedFrame { film, report, objects: self.objects() })
+    }
+
+    /// The names of the objects by number, where they are asked for.
+    fn objects(&self) -> BTreeMap<u32, String> {
+        if !self.world.resource::<Settings>().0.layers.contains(&Layer::ObjectId) {
+            return BTreeMap::new();
+        }
+        let ids = self.world.resource::<Instances>().list.iter().map(|i| i.object_id);
+        let named = ids.zip(0..).map(|(id, index)| (id, self.name_of(index).to_owned()));
+        named.filter(|(_, name)| !name.is_empty()).collect()
     }
 
     /// The first reference of a component to an entity which is not what it should be.

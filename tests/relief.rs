@@ -5,7 +5,7 @@ mod common;
 use common::{Picture, render_description};
 use glam::{DVec3, Vec3};
 use kinora::description::{
-    ImagePixels, Layer, Light, LoadOptions, SceneDescription, Texture, load_scene,
+    ImagePixels, Layer, LayerFilter, Light, LoadOptions, SceneDescription, Texture, load_scene,
 };
 use kinora::film::PlaneSamples;
 use std::path::Path;
@@ -30,6 +30,7 @@ fn relief(size: (u32, u32), samples: u32, overrides: &[(&str, &str)]) -> SceneDe
     (scene.render.size, scene.render.samples) = (size, samples);
     scene.render.max_depth = 1;
     scene.render.layers = vec![Layer::Beauty, Layer::Normal, Layer::Position];
+    scene.render.layer_filter = LayerFilter::Mean;
     scene.entities.shift_remove("sky");
     scene
 }

@@ -226,17 +226,11 @@ impl Job {
         rendered: RenderedFrame,
         start: Instant,
     ) -> Result<FrameEntry, Failure> {
-        let RenderedFrame { film, report, world_to_camera } = rendered;
+        let RenderedFrame { film, report, objects } = rendered;
         let files = FrameFiles::new(&self.folder, &self.name, frame);
         let settings = &self.scene.render;
         let fingerprint = self.fingerprint.of_frame(frame);
-        let metadata = FrameMetadata::new(
-            fingerprint,
-            frame,
-            &self.scene,
-            &report.integrator,
-            world_to_camera,
-        );
+        let metadata = FrameMetadata::new(fingerprint, &self.scene, &report, objects);
         let finished = Instant::now();
         // The larger file first: on a full disk nothing of the frame remains.
         let saturated = write_exr(&files.exr, &film, settings, &metadata)?;

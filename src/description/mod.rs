@@ -33,7 +33,7 @@ pub use read::{LoadOptions, load_scene, parse_scene_str, read_scene};
 pub use scene::{Displacement, EntityDescription, Relief, SceneDescription};
 pub use settings::{
     Background, BvhQuality, Clock, Development, ExrLayout, Filter, IntegratorChoice, Layer,
-    RenderSettings, Terminator, ToneMap,
+    LayerFilter, RenderSettings, Terminator, ToneMap,
 };
 pub use shape::{Shape, TriangleMesh};
 pub use spectrum::SpectrumData;

@@ -93,6 +93,8 @@ pub struct RenderSettings {
     pub tonemap: ToneMap,
     /// What the EXR holds.
     pub layers: Vec<Layer>,
+    /// Of which part of a pixel its layers of geometry tell.
+    pub layer_filter: LayerFilter,
     /// Bits per channel of the beauty layers in the EXR: 16 or 32.
     pub exr_bits: u32,
     /// How the EXR holds its layers.
@@ -128,6 +130,7 @@ impl Default for RenderSettings {
             exposure: 0.0,
             tonemap: ToneMap::Srgb,
             layers: vec![Layer::Beauty],
+            layer_filter: LayerFilter::default(),
             exr_bits: 32,
             exr_layout: ExrLayout::default(),
         }
@@ -278,9 +281,10 @@ pub enum Layer {
     Depth,
     /// Position of the first surface, metres, world space.
     Position,
-    /// Motion of the first surface over the shutter, pixels.
+    /// Motion on the film of the first surface, or of the sky, from the opening of the shutter to its closing, pixels: x to the
+    /// right, y down.
     Motion,
-    /// Index of the object at the first surface, in the order of names; 0 is none.
+    /// Number of the object at the first surface, which follows from its name; 0 is none.
     ObjectId,
     /// Number of samples.
     Samples,
@@ -301,6 +305,23 @@ impl Layer {
         Self::Samples,
         Self::Variance,
     ];
+
+    /// Whether it tells of the geometry that is seen first, as [`LayerFilter`] says.
+    pub fn is_geometry(self) -> bool {
+        matches!(self, Self::Normal | Self::Depth | Self::Position | Self::Motion | Self::ObjectId)
+    }
+}
+
+/// Of which part of a pixel its layers of geometry tell: normal, depth, position, motion and object.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum LayerFilter {
+    /// Its centre, seen through the middle of the lens when the shutter opens: one place of one object, which is there. No
+    /// noise.
+    #[default]
+    Center,
+    /// The mean over its samples, as the beauty: smooth edges, for denoisers; but a mean depth at an edge is one that
+    /// nothing has.
+    Mean,
 }
 
 fn box_radius() -> f32 {

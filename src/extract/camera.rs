@@ -8,6 +8,7 @@
 use crate::description::Focus;
 use crate::math::{Aabb, MotionTransform, Ray};
 use crate::sampling::warp::{square_to_disk, square_to_polygon};
+use crate::step::merge_equal;
 use crate::world::{ActiveCamera, Camera, LookAt, Optics, Settings, ShutterMotion};
 use bevy_ecs::prelude::*;
 use glam::{DMat4, DVec2, DVec3, Vec2};
@@ -25,13 +26,13 @@ pub struct ViewCamera {
     pub world_to_camera: DMat4,
     /// Width and height of the picture in pixels.
     pub size: (u32, u32),
-    projection: Projection,
+    pub(super) projection: Projection,
     /// Radius of the lens in metres, at the times of the field of view.
-    lens_radius: Vec<f64>,
+    pub(super) lens_radius: Vec<f64>,
     /// Axial distance of the plane in focus, at evenly spaced times; infinite for parallel rays.
-    focus: Vec<f64>,
-    blades: u32,
-    blade_rotation: f64,
+    pub(super) focus: Vec<f64>,
+    pub(super) blades: u32,
+    pub(super) blade_rotation: f64,
     /// What the user should know about this camera.
     pub warning: Option<String>,
     /// That the camera is focused on an entity which stands nowhere, in words.
@@ -39,7 +40,7 @@ pub struct ViewCamera {
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Projection {
+pub(super) enum Projection {
     /// Tangent of half the vertical field of view, at evenly spaced times.
     Perspective { tan_half_fov: Vec<f64> },
     /// Half the height of the field in metres.
@@ -73,7 +74,7 @@ pub struct CameraRay {
 }
 
 /// The value at time `u` of keys at evenly spaced times in `[0, 1]`, joined by straight lines.
-fn at(keys: &[f64], u: f64) -> f64 {
+pub(super) fn at(keys: &[f64], u: f64) -> f64 {
     match keys {
         [] => f64::INFINITY,
         [key] => *key,
@@ -93,13 +94,14 @@ impl ViewCamera {
         self.lens_radius.iter().any(|&radius| radius > 0.0)
     }
 
-    /// Whether the camera is the same during the whole shutter.
+    /// Whether the camera is the same during the whole shutter. A pinhole has no focus to change.
     pub fn is_static(&self) -> bool {
         let zooms = match &self.projection {
             Projection::Perspective { tan_half_fov } => tan_half_fov.len() > 1,
             Projection::Orthographic { .. } => false,
         };
-        self.motion.is_static() && !zooms && self.focus.len() <= 1
+        let refocuses = self.has_lens() && self.focus.len() > 1;
+        self.motion.is_static() && !zooms && !refocuses
     }
 
     /// A box around all points where its rays begin, in render space; of a moving camera as a row of
@@ -125,6 +127,18 @@ impl ViewCamera {
     /// The ray through the film point `film` (pixels, x right, y down, (0, 0) the corner of the upper
     /// left pixel) and the lens point drawn by `lens` in `[0, 1)²`, at `time` in `[0, 1]`.
     pub fn ray(&self, film: DVec2, lens: Vec2, time: f32) -> CameraRay {
+        let radius = at(&self.lens_radius, f64::from(time));
+        let on_lens = if radius > 0.0 { self.lens_point(lens) * radius } else { DVec2::ZERO };
+        self.ray_from(film, on_lens, time)
+    }
+
+    /// The ray through a film point and the middle of the lens.
+    pub fn ray_through_centre(&self, film: DVec2, time: f32) -> CameraRay {
+        self.ray_from(film, DVec2::ZERO, time)
+    }
+
+    /// The ray through a film point and a point of the lens in metres.
+    fn ray_from(&self, film: DVec2, on_lens: DVec2, time: f32) -> CameraRay {
         let u = f64::from(time);
         let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
         // −1…1 from bottom to top, the same unit across
@@ -137,15 +151,14 @@ impl ViewCamera {
                 ((plane * *half_height).extend(0.0), DVec3::NEG_Z)
             }
         };
-        let radius = at(&self.lens_radius, u);
-        let (origin, direction) = if radius > 0.0 {
-            let on_lens = (self.lens_point(lens) * radius).extend(0.0);
+        let (origin, direction) = if on_lens == DVec2::ZERO {
+            (origin, direction)
+        } else {
+            let on_lens = on_lens.extend(0.0);
             let focus = at(&self.focus, u);
             // direction.z = −1: the point in focus is focus·direction. Divided by focus, so that an
             // infinite distance gives parallel rays.
             (origin + on_lens, direction - on_lens / focus)
-        } else {
-            (origin, direction)
         };
         let m = self.motion.at(time);
         let ray = Ray {
@@ -180,7 +193,21 @@ impl ViewCamera {
     /// Where a point of render space appears on the film at `time`, in pixels; `None` behind the
     /// camera.
     pub fn project(&self, p: DVec3, time: f32) -> Option<DVec2> {
-        let q = self.motion.inverse_at(time).transform_point3(p);
+        self.on_film(self.motion.inverse_at(time).transform_point3(p), time)
+    }
+
+    /// The same for what is infinitely far away in a direction; `None` for an orthographic camera, to which that is nowhere.
+    pub fn project_direction(&self, d: DVec3, time: f32) -> Option<DVec2> {
+        match &self.projection {
+            Projection::Perspective { .. } => {
+                self.on_film(self.motion.inverse_at(time).transform_vector3(d), time)
+            }
+            Projection::Orthographic { .. } => None,
+        }
+    }
+
+    /// Where a point of camera space appears on the film.
+    fn on_film(&self, q: DVec3, time: f32) -> Option<DVec2> {
         let plane = match &self.projection {
             Projection::Perspective { tan_half_fov } => {
                 if q.z >= 0.0 {
@@ -266,24 +293,33 @@ pub fn extract_camera(
     });
 }
 
-/// Distances along the camera's axis to the origin of a target, over the shutter.
+/// Distances along the camera's axis to the origin of a target, over the shutter; one where all are the same but for
+/// the rounding of the places that they are between: a target may spin, or go across the axis.
 fn axial_distances(camera: &[glam::DAffine3], target: &[glam::DAffine3]) -> Vec<f64> {
     const SEGMENTS: usize = 16;
     let (camera, target) = (MotionTransform::new(camera), MotionTransform::new(target));
     let segments = if camera.is_static() && target.is_static() { 0 } else { SEGMENTS };
-    (0..=segments)
+    let mut reach = 0.0_f64;
+    let mut distances: Vec<f64> = (0..=segments)
         .map(|k| {
             let u = if segments == 0 { 0.0 } else { k as f32 / segments as f32 };
             let m = camera.at(u);
             let axis = m.transform_vector3(DVec3::NEG_Z).normalize();
-            (target.at(u).translation - m.translation).dot(axis)
+            let target = target.at(u).translation;
+            reach = reach.max(target.length()).max(m.translation.length());
+            (target - m.translation).dot(axis)
         })
-        .collect()
+        .collect();
+    merge_equal(&mut distances, reach);
+    distances
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::{Extend, Interpolation, Key, Track};
+    use crate::frame::Simulation;
+    use crate::world::{ChildOf, FrameClock, Keyframes, Transform, Velocity};
 
     fn camera(fov_deg: f64, size: (u32, u32)) -> ViewCamera {
         let tan_half_fov = vec![(fov_deg.to_radians() * 0.5).tan()];
@@ -352,6 +388,66 @@ mod tests {
         for fov in [1e-4, 179.9] {
             let ray = camera(fov, (100, 100)).ray(DVec2::ZERO, Vec2::ZERO, 0.0).ray;
             assert!((ray.d.length() - 1.0).abs() < 1e-6);
+        }
+    }
+
+    /// The camera of a world, half way through a second, with a shutter of half a second.
+    fn seen_from(spawn: impl FnOnce(&mut World)) -> ViewCamera {
+        let mut simulation = Simulation::new();
+        let world = simulation.world_mut();
+        let mut clock = FrameClock::default();
+        (clock.clock.fps, clock.clock.shutter) = (1.0, (0.5, 1.0));
+        world.insert_resource(clock);
+        spawn(world);
+        simulation.prepare_frame(0).expect("a camera");
+        simulation.world().resource::<ViewCamera>().clone()
+    }
+
+    fn place(x: f64, y: f64, z: f64) -> Transform {
+        Transform { translation: DVec3::new(x, y, z), ..Default::default() }
+    }
+
+    /// A camera with a lens at z = 3 m, focused on something at `at` m along x, which moves like this.
+    fn focused(at: f64, linear: DVec3, angular: DVec3, aperture: f64) -> ViewCamera {
+        seen_from(|world| {
+            let target = world.spawn((place(at, 0.1, 0.7), Velocity { linear, angular })).id();
+            let focus = Some(Focus::Entity(target));
+            let camera = crate::world::Camera { aperture, focus, ..Default::default() };
+            world.spawn((camera, place(0.3, 0.1, 3.0)));
+        })
+    }
+
+    /// What spins, or goes across the axis, is in focus at one distance; what comes nearer is not, but a pinhole does not
+    /// mind.
+    #[test]
+    fn a_camera_focused_on_what_keeps_its_distance_stands_still() {
+        let spin = DVec3::new(0.3, 7.0, 0.1);
+        assert!(focused(0.3, DVec3::ZERO, spin, 0.1).is_static());
+        assert!(focused(0.3, DVec3::new(0.7, -0.1, 0.0), spin, 0.1).is_static());
+        assert!(!focused(0.3, DVec3::Z * 0.01, DVec3::ZERO, 0.1).is_static());
+        assert!(focused(0.3, DVec3::Z * 0.01, DVec3::ZERO, 0.0).is_static());
+    }
+
+    fn constant<T: Copy>(value: T, interpolation: Interpolation) -> Track<T> {
+        let key = |time| Key { time, value, tangents: None };
+        Track { keys: vec![key(0.0), key(1.7)], interpolation, extend: Extend::Hold }
+    }
+
+    /// Between equal keys nothing moves, however `a·(1 − s) + a·s` rounds.
+    #[test]
+    fn a_camera_whose_keys_are_equal_stands_still() {
+        for interpolation in [Interpolation::Linear, Interpolation::Cubic] {
+            let p = DVec3::new(0.1, 0.7, 1e3 / 3.0);
+            let translation = Some(constant(p, interpolation));
+            let fov = Some(constant(33.3, interpolation));
+            let focus = Some(constant(0.7, interpolation));
+            let keys = Keyframes { translation, fov, focus, ..Default::default() };
+            let camera = seen_from(|world| {
+                let camera = crate::world::Camera { aperture: 0.1, ..Default::default() };
+                let parent = world.spawn(place(0.1, 0.2, 0.3)).id();
+                world.spawn((camera, keys, place(0.3, 0.1, 3.0), ChildOf(parent)));
+            });
+            assert!(camera.is_static(), "{interpolation:?}: {camera:?}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::displace::Displaced;
 use super::instance::{Instance, NOTHING, Place, Placed, placed};
-use super::{Emissions, FrameOrigin, SurfaceSlots, Surfaces, spawn_order};
+use super::{Emissions, FrameOrigin, SurfaceSlots, Surfaces, object_ids, spawn_order};
 use crate::description::TriangleMesh;
 use crate::math::Aabb;
 use crate::shade::TextureNeeds;
@@ -279,7 +279,7 @@ struct Scene<'a> {
 fn write_all(table: &mut Instances, objects: &ObjectQuery, meshes: &Meshes, scene: &Scene) {
     let mut entities: Vec<Entity> = objects.iter().map(|object| object.0).collect();
     entities.sort_unstable_by_key(|entity| spawn_order(*entity));
-    let ids = object_ids(objects);
+    let ids = numbered(objects);
     let places: Vec<Option<Placed>> = {
         let object = |entity: &Entity| objects.get(*entity).ok();
         let jobs: Vec<_> = entities.iter().map(object).map(|o| o.map(|o| (o.1, o.2))).collect();
@@ -346,14 +346,15 @@ fn write_all(table: &mut Instances, objects: &ObjectQuery, meshes: &Meshes, scen
     table.unseen = false;
 }
 
-/// A number for every object, from 1, in the order of names.
-fn object_ids(objects: &ObjectQuery) -> EntityHashMap<u32> {
+/// A number for every object.
+fn numbered(objects: &ObjectQuery) -> EntityHashMap<u32> {
     let mut by_name: Vec<(&str, Entity)> = objects
         .iter()
         .map(|(entity, _, _, name, ..)| (name.map_or("", |name| name.as_str()), entity))
         .collect();
     by_name.sort_unstable_by_key(|(name, entity)| (*name, spawn_order(*entity)));
-    by_name.into_iter().zip(1..).map(|((_, entity), id)| (entity, id)).collect()
+    let ids = object_ids(by_name.iter().map(|(name, _)| *name));
+    by_name.iter().map(|(_, entity)| *entity).zip(ids).collect()
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! that a scene may be anywhere.
 
 mod camera;
+mod camera_facts;
 mod caustic_noise;
 mod displace;
 mod emissions;
@@ -13,12 +14,14 @@ mod instance;
 mod instances;
 mod lights;
 mod method;
+mod object_ids;
 mod requirements;
 mod resting;
 mod solids;
 mod surfaces;
 
 pub use camera::{CameraRay, FrameOrigin, ViewCamera, extract_camera};
+pub use camera_facts::{CameraFacts, CameraState};
 pub(crate) use displace::meshes_fit;
 pub use displace::{DicingRefused, Displaced, Refusal, displace_meshes};
 pub use emissions::{Emissions, SurfaceEmission, extract_emissions};
@@ -27,6 +30,7 @@ pub use instances::{Instances, Meshes, extract_instances, extract_meshes};
 pub use lights::{PunctualLight, PunctualLights, extract_lights};
 pub(crate) use method::method_suffices;
 pub use method::{ChosenIntegrator, Method, choose_integrator};
+pub use object_ids::object_ids;
 pub use requirements::{Feature, Requirements, derive_requirements};
 pub use resting::{RestingMesh, RestingMeshes, extract_resting_meshes};
 pub use solids::{may_enclose, overlap, overlapping_pairs, solids};

@@ -1,8 +1,8 @@
 //! The film and the tiles that are merged into it.
 
-use super::{FirstHit, PixelSample, Tile, moments};
+use super::{FirstHit, PixelSample, Seen, Tile, moments};
 use crate::color::spectrum::WavelengthSet;
-use crate::description::{Background, Layer, RenderSettings, Rgb};
+use crate::description::{Background, Layer, LayerFilter, RenderSettings, Rgb};
 use glam::{DVec2, DVec3};
 use std::collections::TryReserveError;
 
@@ -31,6 +31,7 @@ pub struct Film {
     window: Tile,
     pub(super) layers: Vec<Layer>,
     pub(super) alpha: bool,
+    layer_filter: LayerFilter,
     pub(super) sums: Sums,
     non_finite: u64,
 }
@@ -39,6 +40,7 @@ pub struct Film {
 #[derive(Debug)]
 pub struct TileBuffer {
     tile: Tile,
+    layer_filter: LayerFilter,
     sums: Sums,
     non_finite: u64,
 }
@@ -54,12 +56,15 @@ pub(super) struct Sums {
     pub transmittance: Vec<f64>,
     /// Sum of squared deviations from the mean.
     pub m2: Vec<DVec3>,
-    /// Samples whose ray met a surface.
+    /// Samples whose ray met a surface: of those which count for the albedo, and of those for the layers of geometry.
+    pub lit_hits: Vec<u32>,
     pub hits: Vec<u32>,
     pub albedo: Vec<DVec3>,
     pub normal: Vec<DVec3>,
     pub depth: Vec<f64>,
     pub position: Vec<DVec3>,
+    /// Samples which count for the motion.
+    pub followed: Vec<u32>,
     pub motion: Vec<DVec2>,
     pub object: Vec<Vote>,
 }
@@ -87,7 +92,8 @@ impl Vote {
 }
 
 impl Film {
-    /// An empty film of `size` pixels (width, height) which collects what `layers` need.
+    /// An empty film of `size` pixels (width, height) which collects what `layers` need, those of geometry as means over
+    /// the samples.
     ///
     /// # Errors
     /// When a side is 0 or the memory cannot be had.
@@ -102,7 +108,9 @@ impl Film {
     /// When nothing of the picture is to be rendered or the memory cannot be had.
     pub fn for_settings(settings: &RenderSettings) -> Result<Self, FilmError> {
         let alpha = settings.background == Background::Transparent;
-        Self::of_window(settings.size, Tile::rendered(settings), &settings.layers, alpha)
+        let film =
+            Self::of_window(settings.size, Tile::rendered(settings), &settings.layers, alpha)?;
+        Ok(Self { layer_filter: settings.layer_filter, ..film })
     }
 
     fn of_window(
@@ -120,7 +128,9 @@ impl Film {
             height,
             source,
         })?;
-        Ok(Self { size, window, layers: layers.to_vec(), alpha, sums, non_finite: 0 })
+        let layers = layers.to_vec();
+        let layer_filter = LayerFilter::Mean;
+        Ok(Self { size, window, layers, alpha, layer_filter, sums, non_finite: 0 })
     }
 
     /// Width and height of the picture in pixels.
@@ -133,9 +143,19 @@ impl Film {
         self.window
     }
 
-    /// Whether any layer needs [`PixelSample::first_hit`].
-    pub fn wants_first_hit(&self) -> bool {
-        !self.sums.hits.is_empty()
+    /// Whether any layer needs [`PixelSample::seen`].
+    pub fn wants_seen(&self) -> bool {
+        let albedo = self.layers.contains(&Layer::Albedo);
+        albedo || (self.wants_geometry() && self.layer_filter == LayerFilter::Mean)
+    }
+
+    /// Whether any layer needs what is seen at the centre of the pixel, see [`TileBuffer::add_centre`].
+    pub fn wants_centres(&self) -> bool {
+        self.wants_geometry() && self.layer_filter == LayerFilter::Center
+    }
+
+    fn wants_geometry(&self) -> bool {
+        self.layers.iter().any(|layer| layer.is_geometry())
     }
 
     /// The tiles of the picture that hold pixels of the film, row by row; together they cover every pixel once.
@@ -167,7 +187,7 @@ impl Film {
             self.size
         );
         let sums = Sums::new(tile.area(), &self.layers, self.alpha).expect("memory for one tile");
-        TileBuffer { tile, sums, non_finite: 0 }
+        TileBuffer { tile, layer_filter: self.layer_filter, sums, non_finite: 0 }
     }
 
     /// Adds the samples of a tile, as far as the film goes.
@@ -243,12 +263,7 @@ impl TileBuffer {
         sample: &PixelSample,
         seen_at: Option<&WavelengthSet>,
     ) {
-        let tile = self.tile;
-        assert!(
-            (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y),
-            "pixel ({x}, {y}) outside {tile:?}"
-        );
-        let index = (y - tile.y0) as usize * (tile.x1 - tile.x0) as usize + (x - tile.x0) as usize;
+        let index = self.index(x, y);
         let finite = sample.radiance.is_finite() && sample.transmittance.is_finite();
         if !finite || sample.radiance.min_element() < 0.0 {
             self.non_finite += 1;
@@ -257,25 +272,51 @@ impl TileBuffer {
         let to_rgb = |seen: Rgb| seen_at.map_or(seen, |set| set.to_rgb * seen);
         self.sums.push(index, to_rgb(sample.radiance));
         add(&mut self.sums.transmittance, index, f64::from(sample.transmittance));
-        if !self.sums.hits.is_empty()
-            && let Some(hit) = &sample.first_hit
-        {
-            if is_finite(hit) {
-                let hit = FirstHit { albedo: to_rgb(hit.albedo), ..*hit };
-                self.sums.push_hit(index, &hit);
-            } else {
-                self.non_finite += 1;
-            }
+        let Some(seen) = &sample.seen else { return };
+        if !is_finite(seen) {
+            self.non_finite += 1;
+            return;
         }
+        if let Some(hit) = &seen.first_hit {
+            self.sums.push_albedo(index, to_rgb(hit.albedo));
+        }
+        if self.layer_filter == LayerFilter::Mean {
+            self.sums.push_geometry(index, seen);
+        }
+    }
+
+    /// Sets the layers of geometry of the pixel in column `x` and row `y` of the **film** to what is seen at its centre:
+    /// once for each pixel, where [`Film::wants_centres`]. What holds a NaN or an infinity is dropped and counted.
+    ///
+    /// # Panics
+    /// When the pixel lies outside the tile.
+    pub fn add_centre(&mut self, x: u32, y: u32, seen: &Seen) {
+        let index = self.index(x, y);
+        if is_finite(seen) {
+            self.sums.push_geometry(index, seen);
+        } else {
+            self.non_finite += 1;
+        }
+    }
+
+    fn index(&self, x: u32, y: u32) -> usize {
+        let tile = self.tile;
+        assert!(
+            (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y),
+            "pixel ({x}, {y}) outside {tile:?}"
+        );
+        (y - tile.y0) as usize * (tile.x1 - tile.x0) as usize + (x - tile.x0) as usize
     }
 }
 
-fn is_finite(hit: &FirstHit) -> bool {
-    hit.albedo.is_finite()
-        && hit.normal.is_finite()
-        && hit.depth.is_finite()
-        && hit.position.is_finite()
-        && hit.motion.is_finite()
+fn is_finite(seen: &Seen) -> bool {
+    let is_finite = |hit: &FirstHit| {
+        hit.albedo.is_finite()
+            && hit.normal.is_finite()
+            && hit.depth.is_finite()
+            && hit.position.is_finite()
+    };
+    seen.motion.is_finite() && seen.first_hit.as_ref().is_none_or(is_finite)
 }
 
 /// `count` copies of the default, or none where they are not wanted.
@@ -291,24 +332,18 @@ fn filled<T: Clone + Default>(wanted: bool, count: usize) -> Result<Vec<T>, TryR
 impl Sums {
     fn new(pixels: usize, layers: &[Layer], alpha: bool) -> Result<Self, TryReserveError> {
         let wants = |layer| layers.contains(&layer);
-        let of_first_hit = [
-            Layer::Albedo,
-            Layer::Normal,
-            Layer::Depth,
-            Layer::Position,
-            Layer::Motion,
-            Layer::ObjectId,
-        ];
         Ok(Self {
             count: filled(true, pixels)?,
             mean: filled(true, pixels)?,
             transmittance: filled(alpha, pixels)?,
             m2: filled(wants(Layer::Variance), pixels)?,
-            hits: filled(of_first_hit.into_iter().any(wants), pixels)?,
+            lit_hits: filled(wants(Layer::Albedo), pixels)?,
+            hits: filled(layers.iter().any(|layer| layer.is_geometry()), pixels)?,
             albedo: filled(wants(Layer::Albedo), pixels)?,
             normal: filled(wants(Layer::Normal), pixels)?,
             depth: filled(wants(Layer::Depth), pixels)?,
             position: filled(wants(Layer::Position), pixels)?,
+            followed: filled(wants(Layer::Motion), pixels)?,
             motion: filled(wants(Layer::Motion), pixels)?,
             object: filled(wants(Layer::ObjectId), pixels)?,
         })
@@ -322,13 +357,19 @@ impl Sums {
         }
     }
 
-    fn push_hit(&mut self, i: usize, hit: &FirstHit) {
-        self.hits[i] += 1;
-        add(&mut self.albedo, i, hit.albedo.as_dvec3());
+    fn push_albedo(&mut self, i: usize, albedo: Rgb) {
+        add(&mut self.lit_hits, i, 1);
+        add(&mut self.albedo, i, albedo.as_dvec3());
+    }
+
+    fn push_geometry(&mut self, i: usize, seen: &Seen) {
+        add(&mut self.followed, i, 1);
+        add(&mut self.motion, i, seen.motion.as_dvec2());
+        let Some(hit) = &seen.first_hit else { return };
+        add(&mut self.hits, i, 1);
         add(&mut self.normal, i, hit.normal.as_dvec3());
         add(&mut self.depth, i, f64::from(hit.depth));
         add(&mut self.position, i, hit.position);
-        add(&mut self.motion, i, hit.motion.as_dvec2());
         if let Some(vote) = self.object.get_mut(i) {
             vote.cast(Vote { id: hit.object_id, lead: 1 });
         }
@@ -342,11 +383,13 @@ impl Sums {
             *m2 += spread + other.m2[j];
         }
         join(&mut self.transmittance, i, &other.transmittance, j);
+        join(&mut self.lit_hits, i, &other.lit_hits, j);
         join(&mut self.hits, i, &other.hits, j);
         join(&mut self.albedo, i, &other.albedo, j);
         join(&mut self.normal, i, &other.normal, j);
         join(&mut self.depth, i, &other.depth, j);
         join(&mut self.position, i, &other.position, j);
+        join(&mut self.followed, i, &other.followed, j);
         join(&mut self.motion, i, &other.motion, j);
         if let Some(vote) = self.object.get_mut(i) {
             vote.cast(other.object[j]);
@@ -372,22 +415,22 @@ mod tests {
     use glam::{Vec2, Vec3};
 
     fn gray(value: f32) -> PixelSample {
-        PixelSample { radiance: Rgb::splat(value), first_hit: None, ..PixelSample::default() }
+        PixelSample { radiance: Rgb::splat(value), ..PixelSample::default() }
     }
 
     fn whole(film: &Film) -> Tile {
         Tile { x0: 0, y0: 0, x1: film.size.0, y1: film.size.1 }
     }
 
-    fn hit(object_id: u32) -> FirstHit {
-        FirstHit {
+    fn hit(object_id: u32) -> Seen {
+        let first_hit = FirstHit {
             albedo: Rgb::splat(0.5),
             normal: Vec3::Z,
             depth: 2.0,
             position: DVec3::new(1.0, 2.0, 3.0),
-            motion: Vec2::new(4.0, -1.0),
             object_id,
-        }
+        };
+        Seen { first_hit: Some(first_hit), motion: Vec2::new(4.0, -1.0) }
     }
 
     /// A plain f32 sum of 0.1 is 1 % off after 10⁶ terms already.
@@ -427,7 +470,7 @@ mod tests {
         let empty = Film::new((70, 50), &layers).expect("small");
         let sample = |x: u32, y: u32, s: u32| PixelSample {
             radiance: Rgb::new(x as f32 * 0.1, y as f32 * 0.37, s as f32 / 3.0),
-            first_hit: (s != 1).then(|| hit(x + 1)),
+            seen: (s != 1).then(|| hit(x + 1)),
             ..PixelSample::default()
         };
         let fill = |tile: Tile| {
@@ -473,22 +516,12 @@ mod tests {
         buffer.add(1, 0, &gray(3.0));
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0] {
             let radiance = Rgb::new(1.0, bad, 1.0);
-            buffer.add(
-                1,
-                0,
-                &PixelSample { radiance, first_hit: Some(hit(1)), ..PixelSample::default() },
-            );
+            let seen = Some(hit(1));
+            buffer.add(1, 0, &PixelSample { radiance, seen, ..PixelSample::default() });
         }
-        let broken_hit = FirstHit { depth: f32::NAN, ..hit(1) };
-        buffer.add(
-            0,
-            0,
-            &PixelSample {
-                radiance: Rgb::ONE,
-                first_hit: Some(broken_hit),
-                ..PixelSample::default()
-            },
-        );
+        let seen = Some(Seen { motion: Vec2::NAN, ..hit(1) });
+        let radiance = Rgb::ONE;
+        buffer.add(0, 0, &PixelSample { radiance, seen, ..PixelSample::default() });
         film.merge(buffer);
         assert_eq!(film.radiance(1, 0), Rgb::splat(3.0));
         assert_eq!(film.radiance(0, 0), Rgb::ONE);
@@ -505,11 +538,8 @@ mod tests {
             for part in [&ids[..cut], &ids[cut..]] {
                 let mut buffer = film.tile_buffer(whole(&film));
                 for &id in part {
-                    buffer.add(
-                        0,
-                        0,
-                        &PixelSample { first_hit: Some(hit(id)), ..PixelSample::default() },
-                    );
+                    let seen = Some(hit(id));
+                    buffer.add(0, 0, &PixelSample { seen, ..PixelSample::default() });
                 }
                 film.merge(buffer);
             }
@@ -520,10 +550,10 @@ mod tests {
     #[test]
     fn memory_is_taken_only_for_the_layers_asked_for() {
         let film = Film::new((8, 8), &[Layer::Beauty]).expect("small");
-        assert!(!film.wants_first_hit());
+        assert!(!film.wants_seen());
         assert!(film.sums.m2.is_empty() && film.sums.albedo.is_empty());
         let film = Film::new((8, 8), &[Layer::Beauty, Layer::Albedo]).expect("small");
-        assert!(film.wants_first_hit());
+        assert!(film.wants_seen() && !film.wants_centres());
         assert!(film.sums.normal.is_empty());
     }
 

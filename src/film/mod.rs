@@ -22,12 +22,22 @@ use std::ops::Range;
 pub struct PixelSample {
     /// Radiance arriving at the film, W·m⁻²·sr⁻¹ per channel.
     pub radiance: Rgb,
-    /// What the camera ray met first, if anything. Ignored unless an auxiliary layer is asked for.
-    pub first_hit: Option<FirstHit>,
+    /// What the camera ray saw first; `None` where no layer asks for it.
+    pub seen: Option<Seen>,
     /// The share of the light from behind everything that would arrive: 0 where the ray has met something, or where
     /// the radiance holds what is behind. Its mean may lie a little outside of `[0, 1]` where a medium is sampled.
     /// Ignored unless the film has an alpha channel.
     pub transmittance: f32,
+}
+
+/// What a camera ray sees first.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// The surface; `None` where there is none, but the sky.
+    pub first_hit: Option<FirstHit>,
+    /// Where its place on the film, or that of the direction in the sky, is when the shutter closes, from where it is when
+    /// it opens, pixels (x right, y down). 0 where one of these is behind the camera.
+    pub motion: Vec2,
 }
 
 /// The surface which a camera ray met first.
@@ -41,9 +51,7 @@ pub struct FirstHit {
     pub depth: f32,
     /// World position, metres.
     pub position: DVec3,
-    /// Motion on the film from shutter opening to closing, pixels (x right, y down).
-    pub motion: Vec2,
-    /// Object id, from 1.
+    /// Number of the object; never 0.
     pub object_id: u32,
 }
 

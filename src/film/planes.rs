@@ -27,10 +27,12 @@ impl Film {
     ///
     /// * `Beauty`: mean radiance, and where the film has it alpha, 1 − the mean transmittance: radiance is premultiplied
     ///   by it (Porter and Duff 1984, "Compositing Digital Images", section 3). `Samples`: how many it is the mean of.
-    /// * `Albedo`, `Normal`, `Position`, `Motion`, `Depth`: mean over the samples that met a surface;
-    ///   normals are not made unit again, so that their length tells how much they agree. Without
-    ///   a hit they are 0, and the depth is +∞.
-    /// * `ObjectId`: the object which most samples met, 0 without a hit.
+    /// * `Albedo`: mean over the samples that met a surface, 0 without a hit.
+    /// * `Normal`, `Position`, `Depth`: by [`LayerFilter`](crate::description::LayerFilter) what is at the centre of the
+    ///   pixel, or the mean over the samples that met a surface; such normals are not made unit again, so that their
+    ///   length tells how much they agree. Without a hit they are 0, and the depth is +∞.
+    /// * `Motion`: the same, of the sky as well.
+    /// * `ObjectId`: the object at the centre, or the one which most samples met; 0 without a hit.
     /// * `Variance`: of the pixel's mean, `M₂ / (n (n − 1))`, +∞ where fewer than 2 samples say nothing
     ///   about it.
     ///
@@ -46,12 +48,12 @@ impl Film {
                 planes.extend(self.alpha.then(|| self.alpha_plane()));
                 planes
             }
-            Layer::Albedo => colors(["R", "G", "B"], &self.mean_over_hits(&sums.albedo)),
-            Layer::Normal => colors(["X", "Y", "Z"], &self.mean_over_hits(&sums.normal)),
-            Layer::Position => colors(["X", "Y", "Z"], &self.mean_over_hits(&sums.position)),
+            Layer::Albedo => colors(["R", "G", "B"], &means(&sums.albedo, &sums.lit_hits)),
+            Layer::Normal => colors(["X", "Y", "Z"], &means(&sums.normal, &sums.hits)),
+            Layer::Position => colors(["X", "Y", "Z"], &means(&sums.position, &sums.hits)),
             Layer::Motion => {
                 let motion: Vec<_> = sums.motion.iter().map(|m| m.extend(0.0)).collect();
-                let mut planes = colors(["X", "Y", "Z"], &self.mean_over_hits(&motion));
+                let mut planes = colors(["X", "Y", "Z"], &means(&motion, &sums.followed));
                 planes.truncate(2);
                 planes
             }
@@ -65,11 +67,6 @@ impl Film {
             }
             Layer::Variance => colors(["R", "G", "B"], &self.variance_of_mean()),
         })
-    }
-
-    fn mean_over_hits(&self, sums: &[DVec3]) -> Vec<DVec3> {
-        // A sum without hits is 0, and stays 0.
-        sums.iter().zip(&self.sums.hits).map(|(&sum, &n)| sum / f64::from(n.max(1))).collect()
     }
 
     fn alpha_plane(&self) -> Plane {
@@ -97,6 +94,11 @@ impl Film {
     }
 }
 
+fn means(sums: &[DVec3], counts: &[u32]) -> Vec<DVec3> {
+    // A sum of nothing is 0, and stays 0.
+    sums.iter().zip(counts).map(|(&sum, &n)| sum / f64::from(n.max(1))).collect()
+}
+
 /// Splits colours or vectors into planes.
 fn colors(names: [&'static str; 3], values: &[DVec3]) -> Vec<Plane> {
     let plane = |axis: usize| values.iter().map(|value| to_f32(value[axis])).collect();
@@ -118,31 +120,34 @@ fn to_f32(value: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::LayerFilter;
     use crate::description::Rgb;
-    use crate::film::{FirstHit, PixelSample, Tile};
+    use crate::film::{FirstHit, PixelSample, Seen, Tile};
     use glam::{Vec2, Vec3};
+
+    fn seen(depth: f32) -> Seen {
+        let first_hit = FirstHit {
+            albedo: Rgb::new(depth, 0.0, 0.0),
+            normal: Vec3::Y,
+            depth,
+            position: glam::DVec3::new(0.0, f64::from(depth), 0.0),
+            object_id: 9,
+        };
+        Seen { first_hit: Some(first_hit), motion: Vec2::new(1.0, -depth) }
+    }
 
     /// Two pixels: the left one is met by two samples of three, the right one by none.
     fn film() -> Film {
         let mut film = Film::new((2, 1), &Layer::ALL).expect("small");
         let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: 2, y1: 1 });
-        let hit = |depth: f32| FirstHit {
-            albedo: Rgb::new(depth, 0.0, 0.0),
-            normal: Vec3::Y,
-            depth,
-            position: glam::DVec3::new(0.0, f64::from(depth), 0.0),
-            motion: Vec2::new(1.0, -depth),
-            object_id: 9,
-        };
-        for first_hit in [Some(hit(1.0)), None, Some(hit(2.0))] {
-            let radiance = Rgb::splat(first_hit.map_or(0.0, |h| h.depth));
-            buffer.add(0, 0, &PixelSample { radiance, first_hit, ..PixelSample::default() });
+        let sky = Seen { first_hit: None, motion: Vec2::new(1.0, 0.0) };
+        let sample =
+            |radiance, seen| PixelSample { radiance, seen: Some(seen), ..PixelSample::default() };
+        for seen in [seen(1.0), sky, seen(2.0)] {
+            let radiance = Rgb::splat(seen.first_hit.map_or(0.0, |h| h.depth));
+            buffer.add(0, 0, &sample(radiance, seen));
         }
-        buffer.add(
-            1,
-            0,
-            &PixelSample { radiance: Rgb::ONE, first_hit: None, ..PixelSample::default() },
-        );
+        buffer.add(1, 0, &sample(Rgb::ONE, sky));
         film.merge(buffer);
         film
     }
@@ -164,11 +169,35 @@ mod tests {
         assert_eq!(f32s(&film, Layer::Albedo, 0), [1.5, 0.0]);
         assert_eq!(f32s(&film, Layer::Normal, 1), [1.0, 0.0]);
         assert_eq!(f32s(&film, Layer::Position, 1), [1.5, 0.0]);
-        assert_eq!(f32s(&film, Layer::Motion, 1), [-1.5, 0.0]);
+        assert_eq!(f32s(&film, Layer::Motion, 0), [1.0, 1.0], "the sky moves as well");
+        assert_eq!(f32s(&film, Layer::Motion, 1), [-1.0, 0.0]);
         assert_eq!(film.image(Layer::Motion).expect("collected").len(), 2);
         let integers = |layer| film.image(layer).expect("collected")[0].samples.clone();
         assert_eq!(integers(Layer::ObjectId), PlaneSamples::U32(vec![9, 0]));
         assert_eq!(integers(Layer::Samples), PlaneSamples::U32(vec![3, 1]));
+    }
+
+    /// Of geometry the centre alone counts, of the albedo the samples.
+    #[test]
+    fn layers_of_geometry_hold_what_is_at_the_centre() {
+        let film = Film::new((1, 1), &Layer::ALL).expect("small");
+        let mut film = film.with_layer_filter(LayerFilter::Center);
+        assert!(film.wants_centres() && film.wants_seen());
+        let tile = Tile { x0: 0, y0: 0, x1: 1, y1: 1 };
+        let mut buffer = film.tile_buffer(tile);
+        buffer.add_centre(0, 0, &seen(4.0));
+        film.merge(buffer);
+        let mut buffer = film.tile_buffer(tile);
+        for depth in [1.0, 2.0] {
+            let seen = Some(seen(depth));
+            let radiance = Rgb::ONE;
+            buffer.add(0, 0, &PixelSample { radiance, seen, ..PixelSample::default() });
+        }
+        film.merge(buffer);
+        assert_eq!(f32s(&film, Layer::Depth, 0), [4.0]);
+        assert_eq!(f32s(&film, Layer::Position, 1), [4.0]);
+        assert_eq!(f32s(&film, Layer::Motion, 1), [-4.0]);
+        assert_eq!(f32s(&film, Layer::Albedo, 0), [1.5]);
     }
 
     #[test]
@@ -183,15 +212,8 @@ mod tests {
         let mut film = Film::new((1, 1), &[Layer::Variance]).expect("small");
         let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: 1, y1: 1 });
         for value in [f32::MAX, f32::MAX, 0.0] {
-            buffer.add(
-                0,
-                0,
-                &PixelSample {
-                    radiance: Rgb::splat(value),
-                    first_hit: None,
-                    ..PixelSample::default()
-                },
-            );
+            let radiance = Rgb::splat(value);
+            buffer.add(0, 0, &PixelSample { radiance, ..PixelSample::default() });
         }
         film.merge(buffer);
         assert!(f32s(&film, Layer::Beauty, 0)[0].is_finite());

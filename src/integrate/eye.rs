@@ -174,7 +174,6 @@ pub(super) struct Walk<I> {
 /// What goes along with all walks of a sample.
 pub(super) struct Context<'a> {
     key: SampleKey,
-    camera_ray: &'a CameraRay,
     first_disk: FirstDisk,
     pub(super) counters: &'a mut PathCounters,
     gathered: Gathered,
@@ -209,15 +208,17 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         };
         let mut context = Context {
             key,
-            camera_ray,
             first_disk,
             counters,
             gathered: Gathered::default(),
             sample: PixelSample::default(),
             distances: Vec::new(),
         };
-        self.walk(walk, &key.sampler(), &mut context);
-        (context.sample, context.gathered)
+        let sampler = key.sampler();
+        self.walk(walk, &sampler, &mut context);
+        let Context { mut sample, gathered, .. } = context;
+        sample.seen = self.path.seen_if_wanted(camera_ray, &sampler, counters);
+        (sample, gathered)
     }
 
     /// Whether light met by chance on this path is left to photons.
@@ -322,11 +323,6 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let seen = (&walk.ray, walk.cone);
         let bsdf = (material != NOTHING)
             .then(|| self.path.bsdf(seen, hit, &mut surface, &at, medium, &mut lobe));
-        if self.path.wants_first_hit && walk.depth == 0 && context.sample.first_hit.is_none() {
-            let ray = &walk.ray;
-            let first = self.path.first_hit(context.camera_ray, ray, hit, &surface, bsdf.as_ref());
-            context.sample.first_hit = Some(first);
-        }
         let Some(bsdf) = bsdf else { return false };
         if walk.depth == self.path.max_depth {
             context.counters.truncated += 1;

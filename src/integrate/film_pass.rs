@@ -1,5 +1,6 @@
 //! All samples of all pixels: tiles in parallel, each pixel's samples in order.
 
+use super::layers::fill_centres;
 use super::photon_passes::PhotonReport;
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
@@ -97,7 +98,7 @@ pub fn render_film(
     let scene = tables.view();
     let requires = |feature| scene.requirements.has(feature);
     let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);
-    let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
+    let begin = Begin { scene, settings, origin: &origin, seen: film.wants_seen() };
     let counters = match (requires(Feature::Opacity), Around::new(scene.requirements)) {
         (false, Around::Clear) => fill(&mut film, &begin.tracer::<false, Clear>(), &job),
         (false, Around::One) => fill(&mut film, &begin.tracer::<false, OneSolid>(), &job),
@@ -160,7 +161,8 @@ pub(super) struct Begin<'a> {
     pub(super) scene: SceneView<'a>,
     pub(super) settings: &'a RenderSettings,
     pub(super) origin: &'a FrameOrigin,
-    pub(super) first_hit: bool,
+    /// Whether the film wants to know of each sample what it saw first.
+    pub(super) seen: bool,
 }
 
 impl<'a> Begin<'a> {
@@ -196,7 +198,7 @@ impl<'a> Begin<'a> {
             roulette_gain: self.settings.roulette_gain,
             inner_reflections: self.settings.inner_reflections,
             clamp_indirect: self.settings.clamp_indirect,
-            wants_first_hit: self.first_hit,
+            wants_seen: self.seen,
             origin: self.origin.0,
             pixel: self.pixel(),
             samples: self.settings.samples,
@@ -214,6 +216,8 @@ fn fill<const OPACITY: bool, I: Inside>(
     tracer: &PathTracer<OPACITY, I>,
     job: &Job,
 ) -> Option<PathCounters> {
+    let rays = fill_centres(film, tracer);
+    job.control.rays.fetch_add(rays, Relaxed);
     let tiles = film.tiles();
     let film = Mutex::new(film);
     let lock = || film.lock().unwrap_or_else(PoisonError::into_inner);
@@ -226,6 +230,7 @@ fn fill<const OPACITY: bool, I: Inside>(
             Some(counters)
         })
         .try_reduce(PathCounters::default, |a, b| Some(a.plus(b)))
+        .map(|counters| PathCounters { rays: counters.rays + rays, ..counters })
 }
 
 fn render_tile<const OPACITY: bool, I: Inside>(

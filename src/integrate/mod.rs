@@ -3,6 +3,7 @@
 mod eye;
 mod eye_medium;
 mod film_pass;
+mod layers;
 mod medium;
 mod path;
 mod photon_passes;

@@ -22,7 +22,7 @@ use crate::build::light::Receiver;
 use crate::build::nesting::Meeting;
 use crate::description::{Background, Rgb};
 use crate::extract::{CameraRay, NOTHING};
-use crate::film::{FirstHit, PixelSample};
+use crate::film::{PixelSample, Seen};
 use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::nesting::{Inside, NestingFaults};
@@ -48,8 +48,8 @@ pub struct PathTracer<'a, const OPACITY: bool, I> {
     pub inner_reflections: u32,
     /// Upper limit of a sample's radiance after its first bounce.
     pub clamp_indirect: Option<f32>,
-    /// Whether the film wants to know what the camera ray met first.
-    pub wants_first_hit: bool,
+    /// Whether the film wants to know what the camera ray saw first.
+    pub wants_seen: bool,
     /// World position of the origin of render space.
     pub origin: DVec3,
     /// What a sample stands for at the camera; a ray where no texture is filtered.
@@ -107,7 +107,6 @@ pub(super) struct Path<'a, I> {
     /// Product of the η² by which refraction has scaled the throughput so far, inverted.
     eta_scale: f32,
     pub(super) arrival: Arrival,
-    first_hit: Option<FirstHit>,
     transmittance: f32,
     pub(super) inside: I,
     /// Whether a light was drawn already.
@@ -136,7 +135,6 @@ impl<'a, I> Path<'a, I> {
             throughput: Rgb::ONE,
             eta_scale: 1.0,
             arrival: Arrival::Sure,
-            first_hit: None,
             transmittance: 0.0,
             inside,
             lit: false,
@@ -224,9 +222,10 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         counters: &mut PathCounters,
     ) -> PixelSample {
         let mut path = self.path_along(camera_ray);
-        self.follow::<false>(&mut path, camera_ray, sampler, counters);
-        let Path { radiance, first_hit, transmittance, .. } = path;
-        PixelSample { radiance, first_hit, transmittance }
+        self.follow::<false>(&mut path, sampler, counters);
+        let seen = self.seen_if_wanted(camera_ray, sampler, counters);
+        let Path { radiance, transmittance, .. } = path;
+        PixelSample { radiance, seen, transmittance }
     }
 
     /// Like [`PathTracer::sample`], with what neighbours may use of the path kept apart.
@@ -237,10 +236,9 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         counters: &mut PathCounters,
     ) -> SharedPath<'a> {
         let mut path = self.path_along(camera_ray);
-        self.follow::<true>(&mut path, camera_ray, sampler, counters);
-        let Path {
-            radiance, first_hit, transmittance, departure, mut landing, before, boost, ..
-        } = path;
+        self.follow::<true>(&mut path, sampler, counters);
+        let seen = self.seen_if_wanted(camera_ray, sampler, counters);
+        let Path { radiance, transmittance, departure, mut landing, before, boost, .. } = path;
         let radiance = match &mut landing {
             Some(landing) => {
                 landing.leaving = radiance * boost;
@@ -248,11 +246,7 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             }
             None => radiance,
         };
-        SharedPath {
-            sample: PixelSample { radiance, first_hit, transmittance },
-            departure,
-            landing,
-        }
+        SharedPath { sample: PixelSample { radiance, seen, transmittance }, departure, landing }
     }
 
     /// Follows a path to its end.
@@ -263,7 +257,6 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
     fn follow<const SHARE: bool>(
         &self,
         path: &mut Path<'a, I>,
-        camera_ray: &CameraRay,
         sampler: &Sampler,
         counters: &mut PathCounters,
     ) {
@@ -302,7 +295,6 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 path.radiance += self.limited(path.throughput * emitted, path.depth);
             }
             if instance.material == NOTHING {
-                self.note_first_hit(path, camera_ray, &hit, &surface, None);
                 break;
             }
             let (media, sides) = ((instance.material, outside), [&mut path.inside, &mut beyond]);
@@ -314,7 +306,6 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             };
             let seen = (&path.ray, path.cone);
             let bsdf = self.bsdf(seen, &hit, &mut surface, &at, medium, &mut lobe);
-            self.note_first_hit(path, camera_ray, &hit, &surface, Some(&bsdf));
             if path.depth == self.max_depth {
                 counters.truncated += 1;
                 break;
@@ -501,18 +492,14 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
             + self.direct(vertex, receiver, sides, near, time, counters)
     }
 
-    /// Keeps what the camera ray met first, for the film that wants it.
-    fn note_first_hit(
+    /// What the camera ray of a sample sees first, for the film that wants it.
+    pub(super) fn seen_if_wanted(
         &self,
-        path: &mut Path<'a, I>,
         camera_ray: &CameraRay,
-        hit: &Hit,
-        surface: &SurfacePoint,
-        bsdf: Option<&Bsdf>,
-    ) {
-        if self.wants_first_hit && path.depth == 0 && path.first_hit.is_none() {
-            path.first_hit = Some(self.first_hit(camera_ray, &path.ray, hit, surface, bsdf));
-        }
+        sampler: &Sampler,
+        counters: &mut PathCounters,
+    ) -> Option<Seen> {
+        self.wants_seen.then(|| self.seen(camera_ray, Some(sampler), &mut counters.rays))
     }
 
     /// Light from infinitely far away along a ray which meets nothing.
@@ -661,33 +648,6 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         match self.clamp_indirect {
             Some(limit) if depth > 0 => radiance.min(Rgb::splat(limit)),
             _ => radiance,
-        }
-    }
-
-    pub(super) fn first_hit(
-        &self,
-        camera_ray: &CameraRay,
-        ray: &Ray,
-        hit: &Hit,
-        surface: &SurfacePoint,
-        bsdf: Option<&Bsdf>,
-    ) -> FirstHit {
-        let scene = &self.scene;
-        let normal = if surface.ns.dot(ray.d) > 0.0 { -surface.ns } else { surface.ns };
-        let depth = (surface.p - camera_ray.ray.o.as_dvec3()).dot(camera_ray.axis);
-        let albedo = bsdf.map_or(Rgb::ZERO, |bsdf| bsdf.albedo(surface.frame().to_local(-ray.d)));
-        let film = |time: f32| scene.camera.project(scene.geometry.point_at(ray, hit, time), time);
-        let motion = match (film(0.0), film(1.0)) {
-            (Some(from), Some(to)) => (to - from).as_vec2(),
-            _ => Vec2::ZERO,
-        };
-        FirstHit {
-            albedo,
-            normal,
-            depth: depth as f32,
-            position: surface.p + self.origin,
-            motion,
-            object_id: scene.geometry.instances[hit.instance as usize].object_id,
         }
     }
 }

@@ -13,6 +13,7 @@
 
 use super::eye::{EyeTracer, FirstDisk, Gathered, Maps, SampleKey};
 use super::film_pass::{Around, Begin, IntegrateStatus, Job};
+use super::layers::fill_centres;
 use super::radius::{PixelRadius, shrunk_by_passes};
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
@@ -134,7 +135,7 @@ pub fn render_film_with_photons(
     let Some(mut film) = status.begin(settings, &control) else { return };
     let scene = tables.view();
     let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);
-    let begin = Begin { scene, settings, origin: &origin, first_hit: film.wants_first_hit() };
+    let begin = Begin { scene, settings, origin: &origin, seen: film.wants_seen() };
     let setting = Setting::new(&scene, &job, chosen.method, &source);
     let scratch = &mut *scratch;
     let opaque = !scene.requirements.has(Feature::Opacity);
@@ -389,6 +390,8 @@ impl<'a> Setting<'a> {
         scratch: &mut PhotonScratch,
     ) -> Option<(PathCounters, PhotonReport)> {
         scratch.faults = NestingFaults::default();
+        let centres = fill_centres(film, &path);
+        self.job.control.rays.fetch_add(centres, Relaxed);
         let mut report = self.plan::<O, I>(scratch);
         let mut tiles: Vec<TileState> =
             film.tiles().into_iter().map(|tile| TileState::new(film, tile)).collect();

@@ -153,11 +153,8 @@ mod tests {
             for y in tile.y0..tile.y1 {
                 for x in tile.x0..tile.x1 {
                     let radiance = Rgb::new(srgb::decode_u8(x as u8), 0.0, y as f32);
-                    buffer.add(
-                        x,
-                        y,
-                        &PixelSample { radiance, first_hit: None, ..PixelSample::default() },
-                    );
+                    let sample = PixelSample { radiance, ..PixelSample::default() };
+                    buffer.add(x, y, &sample);
                 }
             }
             film.merge(buffer);

@@ -4,15 +4,17 @@
 //!
 //! The custom facts are **one** text attribute `kinora` holding a JSON object. The encoder keeps custom
 //! attributes in a hash map with a random order; with a single entry equal frames are equal files,
-//! byte for byte. Standard attributes carry what they can: `software`, `worldToCamera`,
-//! `framesPerSecond`, `chromaticities`. Text is UTF-8, as OpenEXR has it since its version 2.0.
+//! byte for byte. Standard attributes carry what they can: `software`, `chromaticities`, `framesPerSecond`, and of the
+//! camera, as it is when the shutter opens: `worldToCamera`, `worldToNDC`, `screenWindowWidth`, `expTime`, `focus`
+//! and `aperture`. Text is UTF-8, as OpenEXR has it since its version 2.0.
 
 use super::picture::to_half;
 use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
 use crate::color::CHROMATICITIES;
 use crate::description::{ExrLayout, Layer, RenderSettings, SceneDescription};
+use crate::extract::CameraFacts;
 use crate::film::{Film, Plane, PlaneSamples, Tile};
-use crate::frame::RenderedFrame;
+use crate::frame::{FrameReport, RenderedFrame};
 use crate::world::{FrameClock, Settings};
 use bevy_ecs::world::World;
 use exr::error::Error as ExrError;
@@ -23,8 +25,8 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, Layers, Vec2,
     WritableImage, f16,
 };
-use glam::DMat4;
 use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -56,24 +58,26 @@ pub struct FrameMetadata {
     pub software: String,
     /// Units of the layers.
     pub units: String,
-    /// World to camera at shutter opening, column-major. The camera looks along its −z, +y is up.
-    pub world_to_camera: [f64; 16],
+    /// The camera when the shutter opens and when it closes.
+    pub view: CameraFacts,
+    /// The names of the objects by their numbers; in a file, in the part `object_id` alone and of what is seen.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub objects: BTreeMap<u32, String>,
 }
 
 impl FrameMetadata {
     /// What [`FrameMetadata::units`] says.
-    pub const UNITS: &str = "radiance W/(m^2 sr); depth, position m; motion px; \
+    pub const UNITS: &str = "radiance W/(m^2 sr); depth, position m; motion px from shutter opening to closing, x right, y down; \
         linear BT.709 primaries, D65";
 
     /// Gathers the facts of a frame.
     pub fn new(
         fingerprint: Fingerprint,
-        frame: i32,
         scene: &SceneDescription,
-        integrator: &str,
-        world_to_camera: DMat4,
+        report: &FrameReport,
+        objects: BTreeMap<u32, String>,
     ) -> Self {
-        let clock = scene.clock;
+        let (clock, frame) = (scene.clock, report.frame);
         Self {
             fingerprint,
             frame,
@@ -83,10 +87,11 @@ impl FrameMetadata {
             seed: scene.render.seed.to_string(),
             samples: scene.render.samples,
             camera: scene.camera.clone(),
-            integrator: integrator.to_owned(),
+            integrator: report.integrator.clone(),
             software: SOFTWARE.to_owned(),
             units: Self::UNITS.to_owned(),
-            world_to_camera: world_to_camera.to_cols_array(),
+            view: report.camera,
+            objects,
         }
     }
 
@@ -96,8 +101,7 @@ impl FrameMetadata {
         let clock = world.get_resource::<FrameClock>().copied().unwrap_or_default().clock;
         let render = world.get_resource::<Settings>().cloned().unwrap_or_default().0;
         let scene = SceneDescription { clock, render, ..Default::default() };
-        let RenderedFrame { report, world_to_camera, .. } = rendered;
-        Self::new(Fingerprint(0), report.frame, &scene, &report.integrator, *world_to_camera)
+        Self::new(Fingerprint(0), &scene, &rendered.report, rendered.objects.clone())
     }
 }
 
@@ -125,6 +129,9 @@ pub fn write_exr(
         written.push(layer);
         let Some(planes) = film.image(layer) else { continue };
         let halves = layer == Layer::Beauty && settings.exr_bits == 16;
+        let has_ids = layer == Layer::ObjectId || settings.exr_layout == ExrLayout::Single;
+        let ids = film.image(Layer::ObjectId).filter(|_| has_ids).unwrap_or_default();
+        let facts = FrameMetadata { objects: seen(&ids, metadata), ..metadata.clone() };
         let channels = planes.into_iter().map(|plane| channel(plane, halves, &mut saturated));
         match (settings.exr_layout, layers.first_mut()) {
             (ExrLayout::Single, Some(first)) => {
@@ -134,7 +141,7 @@ pub fn write_exr(
             }
             _ => layers.push(exr::image::Layer::new(
                 size_of(film.window()),
-                layer_attributes(layer, film, metadata)?,
+                layer_attributes(layer, film, &facts)?,
                 encoding(layer),
                 AnyChannels::sort(channels.collect()),
             )),
@@ -163,6 +170,16 @@ pub fn read_metadata(path: &Path) -> Result<Option<FrameMetadata>, ExrError> {
     })
 }
 
+/// The names of those objects whose numbers are in the pixels of a layer.
+fn seen(planes: &[Plane], metadata: &FrameMetadata) -> BTreeMap<u32, String> {
+    let [Plane { name: "id", samples: PlaneSamples::U32(ids) }] = planes else {
+        return BTreeMap::new();
+    };
+    let ids: BTreeSet<u32> = ids.iter().copied().collect();
+    let named = |id| Some((id, metadata.objects.get(&id)?.clone()));
+    ids.into_iter().filter_map(named).collect()
+}
+
 fn size_of(part: Tile) -> Vec2<usize> {
     Vec2(part.size().0 as usize, part.size().1 as usize)
 }
@@ -186,7 +203,16 @@ fn layer_attributes(
     let mut attributes = LayerAttributes::named(layer_name(layer));
     attributes.layer_position = Vec2(film.window().x0 as i32, film.window().y0 as i32);
     attributes.software_name = Some(text(&metadata.software));
-    attributes.world_to_camera = Some(row_vector_convention(metadata.world_to_camera));
+    let camera = &metadata.view.opening;
+    attributes.world_to_camera = Some(row_vector_convention(camera.world_to_camera));
+    attributes.world_to_normalized_device = Some(row_vector_convention(camera.world_to_ndc()));
+    attributes.screen_window_width = camera.screen_window.0 as f32;
+    // Not in the standard's list, but what several programs write and read.
+    attributes.horizontal_field_of_view = camera.fov_deg.map(|(across, _)| across as f32);
+    attributes.vertical_field_of_view = camera.fov_deg.map(|(_, up)| up as f32);
+    attributes.focus = camera.focus.map(|metres| metres as f32);
+    attributes.aperture = camera.f_number.map(|stops| stops as f32);
+    attributes.exposure = Some(((metadata.shutter.1 - metadata.shutter.0) / metadata.fps) as f32);
     attributes.frames_per_second = rational(metadata.fps);
     attributes.other.insert(text(ATTRIBUTE), AttributeValue::Text(text(&json)));
     Ok(attributes)
@@ -199,8 +225,8 @@ fn text(text: &str) -> Text {
 
 /// OpenEXR (Imath) multiplies row vectors from the left and stores rows: that is our column-major order
 /// for column vectors, number by number.
-fn row_vector_convention(world_to_camera: [f64; 16]) -> [f32; 16] {
-    world_to_camera.map(|value| value as f32)
+fn row_vector_convention(columns: [f64; 16]) -> [f32; 16] {
+    columns.map(|value| value as f32)
 }
 
 /// Frames per second as a fraction in thousandths, or nothing where that is not exact enough: 23.976
@@ -258,15 +284,24 @@ fn in_layer(layer: Layer, mut channel: AnyChannel<FlatSamples>) -> AnyChannel<Fl
 pub(super) mod tests {
     use super::*;
     use crate::description::{Rgb, SceneDescription};
+    use crate::extract::CameraState;
     use crate::film::{PixelSample, Tile};
     use crate::output::picture::Picture;
     use exr::prelude::{ReadChannels, ReadLayers, read};
+    use glam::{DMat4, DVec3};
 
     pub fn metadata(fingerprint: u128) -> FrameMetadata {
         let mut scene = SceneDescription { camera: "eye".into(), ..Default::default() };
         scene.render.seed = u64::MAX;
-        let view = DMat4::from_translation(glam::DVec3::new(1.0, 2.0, 3.0));
-        FrameMetadata::new(Fingerprint(fingerprint), 12, &scene, "Path", view)
+        let mut opening =
+            CameraState { screen_window: (3.0, 1.5), focus: Some(4.0), ..CameraState::default() };
+        opening.f_number = Some(2.8);
+        opening.world_to_camera =
+            DMat4::from_translation(DVec3::new(1.0, 2.0, 3.0)).to_cols_array();
+        let camera = CameraFacts { opening, ..CameraFacts::default() };
+        let report =
+            FrameReport { frame: 12, integrator: "Path".into(), camera, ..FrameReport::default() };
+        FrameMetadata::new(Fingerprint(fingerprint), &scene, &report, BTreeMap::new())
     }
 
     pub fn film(values: &[f32], layers: &[Layer]) -> Film {
@@ -274,11 +309,8 @@ pub(super) mod tests {
         let mut buffer = film.tile_buffer(Tile { x0: 0, y0: 0, x1: values.len() as u32, y1: 1 });
         for (x, &value) in values.iter().enumerate() {
             let radiance = Rgb::new(value, 0.5 * value, 0.0);
-            buffer.add(
-                x as u32,
-                0,
-                &PixelSample { radiance, first_hit: None, ..PixelSample::default() },
-            );
+            let sample = PixelSample { radiance, ..PixelSample::default() };
+            buffer.add(x as u32, 0, &sample);
         }
         film.merge(buffer);
         film
@@ -321,6 +353,13 @@ pub(super) mod tests {
         let attributes = &back.layer_data[0].attributes;
         assert_eq!(attributes.world_to_camera.expect("set")[12..15], [1.0, 2.0, 3.0]);
         assert_eq!(attributes.frames_per_second, Some((24_000, 1000)));
+        assert_eq!(attributes.screen_window_width, 3.0);
+        assert_eq!((attributes.focus, attributes.aperture), (Some(4.0), Some(2.8)));
+        // Half of a frame of 1/24 s.
+        assert_eq!(attributes.exposure, Some(0.5 / 24.0));
+        // An orthographic camera, for it has no angle: 2/3 of x = 1, and z is the depth.
+        let ndc = attributes.world_to_normalized_device.expect("set");
+        assert_eq!((ndc[0], ndc[12], ndc[14]), (2.0 / 3.0, 2.0 / 3.0, -3.0));
         assert!(back.attributes.chromaticities.is_some());
     }
 

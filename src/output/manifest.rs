@@ -7,7 +7,8 @@
 
 use super::{Fingerprint, FrameFiles};
 use super::{JobFingerprint, MANIFEST_NAME, OutputError, SOFTWARE, write_atomically};
-use crate::description::{Clock, RenderSettings, SceneDescription};
+use crate::description::{Clock, Layer, RenderSettings, SceneDescription};
+use crate::extract::object_ids;
 use crate::frame::FrameReport;
 use serde::Serialize;
 use serde_json::Value;
@@ -33,6 +34,8 @@ pub struct RunFacts {
     pub overrides: Vec<String>,
     /// Threads that rendered.
     pub threads: usize,
+    /// The names of all objects by their numbers in the layer `ObjectId`; empty without that layer.
+    pub objects: BTreeMap<u32, String>,
 }
 
 impl RunFacts {
@@ -47,8 +50,20 @@ impl RunFacts {
             settings: scene.render.clone(),
             overrides: overrides.to_vec(),
             threads,
+            objects: objects(scene),
         }
     }
+}
+
+/// The names of all objects by number, where they are asked for.
+fn objects(scene: &SceneDescription) -> BTreeMap<u32, String> {
+    if !scene.render.layers.contains(&Layer::ObjectId) {
+        return BTreeMap::new();
+    }
+    let shapes = scene.entities.iter().filter(|(_, entity)| entity.shape.is_some());
+    let mut names: Vec<&str> = shapes.map(|(name, _)| name.as_str()).collect();
+    names.sort_unstable();
+    object_ids(names.iter().copied()).zip(names.iter().map(|name| (*name).to_owned())).collect()
 }
 
 /// What the manifest says of one frame.

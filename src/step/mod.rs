@@ -17,6 +17,7 @@ mod waves;
 pub use deform::deform_meshes;
 pub use hierarchy::propagate_poses;
 pub use pose::{PoseInput, evaluate_optics_at, local_pose, pose_moving_entities};
+pub(crate) use shutter::merge_equal;
 pub use shutter::sample_shutter;
 pub use views::survey_views;
 

@@ -35,6 +35,21 @@ const FITTED_AT_ONCE: usize = 64;
 /// Motion below this share of a coordinate is rounding noise of the matrix products in `f64`.
 const NOISE: f64 = f64::EPSILON * 4096.0;
 
+/// What differs by less than this share of a coordinate is the same. Values between equal keys and each product in a chain of
+/// parents round a handful of times, by ε/2 each: room for chains of some ten. It is less than [`NOISE`], which is no more
+/// than a part of a motion that is kept, for what is below is not seen to move at all.
+const ROUNDING: f64 = f64::EPSILON * 64.0;
+
+/// Leaves the first of values at evenly spaced times where all are the same, but for the rounding of numbers as large
+/// as `size` from which they were computed.
+pub(crate) fn merge_equal(values: &mut Vec<f64>, size: f64) {
+    if let [first, rest @ ..] = &values[..]
+        && rest.iter().all(|value| value == first || (value - first).abs() <= ROUNDING * size)
+    {
+        values.truncate(1);
+    }
+}
+
 /// Runs the pose systems over the shutter and writes [`ShutterMotion`], [`Optics`] and
 /// [`EmissionFactor`] where they are different from before.
 ///
@@ -131,9 +146,7 @@ impl Samples {
                 let least = least.get(entity).copied().unwrap_or(1);
                 match poses.split_first() {
                     None => (Vec::new(), true),
-                    Some((here, rest)) if least <= 1 && rest.iter().all(|pose| pose == here) => {
-                        (vec![*here], true)
-                    }
+                    Some((here, _)) if least <= 1 && rests(poses) => (vec![*here], true),
                     Some(_) => fewest_keys(poses, least, tolerance),
                 }
             })
@@ -190,10 +203,20 @@ fn speed_with_ancestors(world: &World, own: &EntityHashMap<f64>, entity: Entity)
     speed
 }
 
+/// Whether the poses are the same but for rounding, as those between equal keys are.
+fn rests(poses: &[DAffine3]) -> bool {
+    let here = &poses[0];
+    if poses.iter().all(|pose| pose == here) {
+        return true;
+    }
+    let noise = Allowance::of(poses, 0.0, ROUNDING);
+    poses.iter().all(|pose| noise.covers(here, pose))
+}
+
 /// The poses to keep, and whether they describe the motion within the tolerance.
 fn fewest_keys(poses: &[DAffine3], least: usize, tolerance: f64) -> (Vec<DAffine3>, bool) {
     let grid = poses.len() - 1;
-    let allowed = Allowance::of(poses, tolerance);
+    let allowed = Allowance::of(poses, tolerance, NOISE);
     let split: Vec<Decomposed> = poses.iter().map(Decomposed::new).collect();
     let mut segments = least.next_power_of_two().min(grid);
     // A grid that is used up has no samples left to test against.
@@ -220,7 +243,7 @@ struct Allowance {
 }
 
 impl Allowance {
-    fn of(poses: &[DAffine3], tolerance: f64) -> Self {
+    fn of(poses: &[DAffine3], tolerance: f64, noise: f64) -> Self {
         let first = poses[0];
         let mut moved = (0.0_f64, 0.0_f64);
         let mut size = (0.0_f64, 0.0_f64);
@@ -231,8 +254,8 @@ impl Allowance {
             size.1 = size.1.max(largest(pose.matrix3));
         }
         Self {
-            translation: tolerance * moved.0 + NOISE * size.0,
-            linear: tolerance * moved.1 + NOISE * size.1,
+            translation: tolerance * moved.0 + noise * size.0,
+            linear: tolerance * moved.1 + noise * size.1,
         }
     }
 
@@ -262,9 +285,8 @@ fn sample_optics(world: &mut World, open: f64, close: f64) {
                 optics.focus.extend(focus);
             }
             for values in [&mut optics.fov_deg, &mut optics.focus] {
-                if values.windows(2).all(|pair| pair[0] == pair[1]) {
-                    values.truncate(1);
-                }
+                let size = values.iter().copied().fold(0.0, f64::max);
+                merge_equal(values, size);
             }
             (entity, optics)
         })
