@@ -88,7 +88,7 @@ pub struct Census {
     uneven: usize,
     spectral: usize,
     invisible: usize,
-    /// Those which may cast caustics, and those on which photons may be gathered.
+    /// Those which cast caustics worth having, and those on which photons may be gathered.
     specular: usize,
     storable: usize,
 }
@@ -118,7 +118,7 @@ impl Census {
             census.uneven += if uneven { count } else { 0 };
             let invisible = materials.is_invisible(material, None);
             census.invisible += if invisible { count } else { 0 };
-            let specular = !invisible && materials.may_cast_caustics(material, min_alpha);
+            let specular = !invisible && materials.casts_caustics(material, min_alpha);
             census.specular += if specular { count } else { 0 };
             let storable = materials.may_be_storable(material, min_alpha);
             census.storable += if storable { count } else { 0 };

@@ -120,8 +120,8 @@ fn to_f32(value: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::LayerFilter;
     use crate::description::Rgb;
+    use crate::description::{LayerFilter, RenderSettings};
     use crate::film::{FirstHit, PixelSample, Seen, Tile};
     use glam::{Vec2, Vec3};
 
@@ -180,8 +180,10 @@ mod tests {
     /// Of geometry the centre alone counts, of the albedo the samples.
     #[test]
     fn layers_of_geometry_hold_what_is_at_the_centre() {
-        let film = Film::new((1, 1), &Layer::ALL).expect("small");
-        let mut film = film.with_layer_filter(LayerFilter::Center);
+        let layers = Layer::ALL.to_vec();
+        let settings = RenderSettings { size: (1, 1), layers, ..RenderSettings::default() };
+        assert_eq!(settings.layer_filter, LayerFilter::Center, "the default");
+        let mut film = Film::for_settings(&settings).expect("small");
         assert!(film.wants_centres() && film.wants_seen());
         let tile = Tile { x0: 0, y0: 0, x1: 1, y1: 1 };
         let mut buffer = film.tile_buffer(tile);

@@ -41,7 +41,9 @@ pub(crate) use energy::{
     AlbedoTable, ReflectorTable, Widths, coat_table, glass_table, reflector_table,
     reflector_table_at,
 };
-pub(crate) use fresnel::{ConductorFresnel, dielectric_average};
+pub(crate) use fresnel::{
+    ConductorFresnel, SCHLICK_AVERAGE, dielectric_average, normal_reflectance,
+};
 pub(crate) use ggx::SMOOTH_BELOW_ALPHA;
 pub(crate) use principled::PrincipledParameters;
 

@@ -4,9 +4,11 @@
 //! resolved once: metals to their indices, roughness to the GGX width `α = roughness²`, the energy
 //! tables of rough interfaces.
 
+mod caustics;
 mod compile;
 mod relief;
 
+pub use caustics::CausticLobe;
 pub(super) use compile::{Width, alpha, glass_width};
 pub use relief::{Surroundings, bent_normal};
 
@@ -410,9 +412,18 @@ impl MaterialTable {
         match &self.materials[material as usize].kind {
             Kind::Diffuse { .. } => false,
             Kind::Mirror { .. } | Kind::ThinGlass { .. } => true,
-            Kind::Dielectric { width, .. }
-            | Kind::Conductor { width, .. }
-            | Kind::Principled { width, .. } => width.narrowest() < min_alpha,
+            Kind::Dielectric { width, .. } | Kind::Conductor { width, .. } => {
+                width.narrowest() < min_alpha
+            }
+            Kind::Principled { base_color, metallic, width, transmission, .. } => {
+                // Only where nothing diffuse is below is a rough gloss apart.
+                let may_be_one =
+                    |share: &Value<f32, u32>| !matches!(share, Value::Constant(s) if *s < 1.0);
+                let bare = *base_color == Value::Constant(Rgb::ZERO)
+                    || may_be_one(metallic)
+                    || may_be_one(transmission);
+                width.narrowest() == 0.0 || (bare && width.narrowest() < min_alpha)
+            }
             // The rough coat goes with its base, which is diffuse.
             Kind::Plastic { width, .. } => width.narrowest() == 0.0,
             Kind::Mix { a, b, .. } => {

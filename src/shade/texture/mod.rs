@@ -7,12 +7,14 @@
 
 mod grid;
 mod image;
+mod moments;
 mod pattern;
 mod point;
 mod pyramid;
 mod range;
 mod solid;
 
+pub use moments::Moments;
 pub use point::TexturePoint;
 pub use pyramid::Pyramid;
 pub use range::{Ranges, Region};
