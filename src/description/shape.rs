@@ -2,7 +2,7 @@
 
 use super::Rgb;
 use super::profile::built;
-use crate::math::Profile;
+use crate::math::{Chart, Profile};
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
 use std::sync::Arc;
@@ -106,6 +106,8 @@ pub struct TriangleMesh {
     pub normals: Vec<glam::Vec3>,
     /// Texture coordinates, or empty: (0, 0), (1, 0), (1, 1) on every triangle.
     pub uvs: Vec<glam::Vec2>,
+    /// Where the coordinates end, of meshes made from shapes; files do not say.
+    pub chart: Chart,
     /// Unit tangents that a normal map was made for, and the sign of `normal × tangent` along its green; 0 where
     /// none is given. Empty where none is: they follow from the coordinates.
     pub tangents: Vec<glam::Vec4>,

@@ -10,6 +10,7 @@
 //! ```
 
 use super::TriangleMesh;
+use crate::math::Chart;
 use glam::{DVec2, Vec2, Vec3};
 use serde::Deserialize;
 use std::f64::consts::TAU;
@@ -88,7 +89,8 @@ impl Waves {
             }
         }
         let normals = vec![Vec3::Y; positions.len()];
-        TriangleMesh { positions, normals, uvs, triangles, ..Default::default() }
+        let chart = Chart::SQUARE;
+        TriangleMesh { positions, normals, uvs, chart, triangles, ..Default::default() }
     }
 }
 

@@ -179,7 +179,7 @@ fn moved(
             p: mesh.positions[k].as_dvec3(),
             n: faces[k],
             color: mesh.colors.get(k).copied().unwrap_or(Vec3::ONE),
-            ..TexturePoint::at(mesh.uvs.get(k).copied().unwrap_or(Vec2::ZERO))
+            ..TexturePoint::on(mesh.chart, mesh.uvs.get(k).copied().unwrap_or(Vec2::ZERO))
         };
         let outward = outward[weld.place[k] as usize].normalize_or_zero();
         let vector = || (textures.vector(texture, &at).as_dvec3() - middle) * strength;

@@ -2,6 +2,7 @@
 
 mod bernstein;
 mod bounds;
+mod chart;
 mod cone;
 mod cubic;
 mod frame;
@@ -14,6 +15,7 @@ mod swept;
 mod twofold;
 
 pub use bounds::Aabb;
+pub use chart::{Chart, Edge};
 pub use cone::Cone;
 pub use cubic::{Control, Cubic, bezier_of_spline, clamped_knots, spline};
 pub use frame::Frame;

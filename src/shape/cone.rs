@@ -3,6 +3,7 @@
 use super::{
     AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, cylinder, longitude, recentred,
 };
+use crate::math::Chart;
 use crate::sampling::warp::square_to_disk;
 use glam::{DAffine3, DVec3, Vec2};
 use std::f64::consts::{PI, SQRT_2};
@@ -60,7 +61,8 @@ pub(super) fn surface(p: DVec3, face: u32) -> LocalSurface {
     let on_side = DVec3::new(radial.x * r, p.y, radial.z * r);
     let normal = radial + DVec3::Y;
     let uv = (longitude(radial), p.y + 0.5);
-    LocalSurface::smooth(on_side, normal, uv, DVec3::new(radial.z, 0.0, -radial.x))
+    let dpdu = DVec3::new(radial.z, 0.0, -radial.x);
+    LocalSurface::smooth(on_side, normal, uv, Chart::AROUND, dpdu)
 }
 
 /// The probability of the side: about its share of the world's area.

@@ -1,6 +1,7 @@
 //! The unit cube. Faces are numbered −x, +x, −y, +y, −z, +z.
 
 use super::{AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface};
+use crate::math::Chart;
 use glam::{DAffine3, DVec3, Vec2};
 
 pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
@@ -52,7 +53,7 @@ pub(super) fn surface(p: DVec3, face: u32) -> LocalSurface {
     let mut on_face = p;
     on_face[axis] = 0.5 * n[axis];
     let uv = (0.5 + on_face.dot(x), 0.5 + on_face.dot(y));
-    LocalSurface::smooth(on_face, n, uv, x)
+    LocalSurface::smooth(on_face, n, uv, Chart::SQUARE, x)
 }
 
 /// The probabilities with which [`sample`] takes the faces: their shares of the world's area.

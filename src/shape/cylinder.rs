@@ -1,6 +1,7 @@
 //! The cylinder of radius 1 around y from −½ to ½. Faces: 0 the side, 1 the lower, 2 the upper end.
 
 use super::{AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, longitude, recentred};
+use crate::math::Chart;
 use crate::sampling::warp::square_to_disk;
 use glam::{DAffine3, DVec3, Vec2};
 use std::f64::consts::{PI, TAU};
@@ -48,7 +49,8 @@ pub(super) fn surface(p: DVec3, face: u32) -> LocalSurface {
             let radial = DVec3::new(p.x, 0.0, p.z).normalize();
             let on_side = DVec3::new(radial.x, p.y, radial.z);
             let uv = (longitude(p), p.y + 0.5);
-            LocalSurface::smooth(on_side, radial, uv, DVec3::new(radial.z, 0.0, -radial.x))
+            let dpdu = DVec3::new(radial.z, 0.0, -radial.x);
+            LocalSurface::smooth(on_side, radial, uv, Chart::AROUND, dpdu)
         }
         1 => cap(p, -0.5),
         _ => cap(p, 0.5),
@@ -59,7 +61,7 @@ pub(super) fn surface(p: DVec3, face: u32) -> LocalSurface {
 pub(super) fn cap(p: DVec3, y: f64) -> LocalSurface {
     let normal = DVec3::new(0.0, y.signum(), 0.0);
     let uv = (0.5 + 0.5 * p.x, 0.5 - 0.5 * p.z * y.signum());
-    LocalSurface::smooth(DVec3::new(p.x, y, p.z), normal, uv, DVec3::X)
+    LocalSurface::smooth(DVec3::new(p.x, y, p.z), normal, uv, Chart::SQUARE, DVec3::X)
 }
 
 /// The probabilities of side, lower and upper end: about their shares of the world's area.

@@ -1,6 +1,7 @@
 //! The unit disk facing +z.
 
 use super::{CanonicalPoint, LocalHit, LocalRay, LocalSurface};
+use crate::math::Chart;
 use crate::sampling::warp::square_to_disk;
 use glam::{DVec3, Vec2};
 
@@ -18,7 +19,7 @@ pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
 
 pub(super) fn surface(p: DVec3) -> LocalSurface {
     let p = DVec3::new(p.x, p.y, 0.0);
-    LocalSurface::smooth(p, DVec3::Z, (0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y), DVec3::X)
+    LocalSurface::smooth(p, DVec3::Z, (0.5 + 0.5 * p.x, 0.5 + 0.5 * p.y), Chart::SQUARE, DVec3::X)
 }
 
 pub(super) fn sample(u: Vec2) -> CanonicalPoint {

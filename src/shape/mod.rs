@@ -25,7 +25,7 @@ pub(crate) use triangle::{INEXACT, OPEN};
 pub use triangle::{TriangleTest, area_of as triangle_area, sample_triangle, triangle_pdf};
 
 use crate::description::Rgb;
-use crate::math::{Aabb, gamma_f64};
+use crate::math::{Aabb, Chart, gamma_f64};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
 /// [`LocalSurface::error`] of the shapes whose size is 1.
@@ -72,6 +72,8 @@ pub struct LocalSurface {
     pub ns: DVec3,
     /// Surface coordinates.
     pub uv: Vec2,
+    /// Where they end.
+    pub chart: Chart,
     /// Direction in which u grows; may be 0.
     pub dpdu: DVec3,
     /// Colour of a mesh, interpolated between its corners; 1 of all else.
@@ -82,12 +84,13 @@ pub struct LocalSurface {
 }
 
 impl LocalSurface {
-    fn smooth(p: DVec3, normal: DVec3, uv: (f64, f64), dpdu: DVec3) -> Self {
+    fn smooth(p: DVec3, normal: DVec3, uv: (f64, f64), chart: Chart, dpdu: DVec3) -> Self {
         Self {
             p,
             ng: normal,
             ns: normal,
             uv: Vec2::new(uv.0 as f32, uv.1 as f32),
+            chart,
             dpdu,
             color: Rgb::ONE,
             error: UNIT_ERROR,

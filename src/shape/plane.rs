@@ -1,6 +1,7 @@
 //! The infinite plane y = 0.
 
 use super::{LocalHit, LocalRay, LocalSurface};
+use crate::math::Chart;
 use glam::DVec3;
 
 pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
@@ -10,5 +11,5 @@ pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
 
 pub(super) fn surface(p: DVec3) -> LocalSurface {
     let p = DVec3::new(p.x, 0.0, p.z);
-    LocalSurface::smooth(p, DVec3::Y, (p.x, -p.z), DVec3::X)
+    LocalSurface::smooth(p, DVec3::Y, (p.x, -p.z), Chart::ENDLESS, DVec3::X)
 }

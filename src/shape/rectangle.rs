@@ -1,6 +1,7 @@
 //! The unit square facing +z.
 
 use super::{CanonicalPoint, LocalHit, LocalRay, LocalSurface};
+use crate::math::Chart;
 use glam::{DVec2, DVec3, Vec2};
 
 pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
@@ -15,7 +16,7 @@ pub(super) fn intersect(ray: &LocalRay, t_max: f64) -> Option<LocalHit> {
 
 pub(super) fn surface(p: DVec3) -> LocalSurface {
     let p = DVec3::new(p.x, p.y, 0.0);
-    LocalSurface::smooth(p, DVec3::Z, (p.x + 0.5, p.y + 0.5), DVec3::X)
+    LocalSurface::smooth(p, DVec3::Z, (p.x + 0.5, p.y + 0.5), Chart::SQUARE, DVec3::X)
 }
 
 pub(super) fn sample(u: Vec2) -> CanonicalPoint {

@@ -1,7 +1,7 @@
 //! The unit sphere.
 
 use super::{CanonicalPoint, LocalHit, LocalRay, LocalSurface, longitude, recentred};
-use crate::math::Frame;
+use crate::math::{Chart, Frame};
 use crate::sampling::warp::{uniform_cone, uniform_sphere};
 use glam::{DVec3, Vec2};
 use std::f64::consts::{PI, TAU};
@@ -25,7 +25,7 @@ pub(super) fn surface(p: DVec3, needs_uv: bool) -> LocalSurface {
     let p = p.normalize();
     let uv =
         if needs_uv { (longitude(p), 0.5 + p.y.clamp(-1.0, 1.0).asin() / PI) } else { (0.0, 0.0) };
-    LocalSurface::smooth(p, p, uv, DVec3::new(p.z, 0.0, -p.x))
+    LocalSurface::smooth(p, p, uv, Chart::AROUND, DVec3::new(p.z, 0.0, -p.x))
 }
 
 pub(super) fn sample(u: Vec2) -> CanonicalPoint {

@@ -68,11 +68,11 @@ impl VertexMotion {
         let bounds = Aabb::from_points(points);
         let mut keys = keys.into_iter();
         let Vertices { positions, normals } = keys.next().expect("a motion has a first key");
-        let TriangleMesh { uvs, colors, triangles, .. } = (**rest.data()).clone();
+        let TriangleMesh { uvs, chart, colors, triangles, .. } = (**rest.data()).clone();
         // Tangents of the mesh at rest are not those of another form.
         let tangents = Vec::new();
         let opening =
-            Arc::new(TriangleMesh { positions, normals, uvs, tangents, colors, triangles });
+            Arc::new(TriangleMesh { positions, normals, uvs, chart, tangents, colors, triangles });
         Self { opening, later: Arc::new(keys.collect()), bounds, made_for: Some(made_for) }
     }
 

@@ -4,7 +4,7 @@ use super::top::Joined;
 use super::{Hit, MeshTree, SceneGeometry};
 use crate::description::{Rgb, TriangleMesh};
 use crate::extract::{Geometry, Instance};
-use crate::math::{Frame, MotionTransform, Ray, gamma_f64};
+use crate::math::{Chart, Frame, MotionTransform, Ray, gamma_f64};
 use crate::shape::{LocalSurface, rounding_error};
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 
@@ -21,6 +21,8 @@ pub struct SurfacePoint {
     pub ns: Vec3,
     /// Surface coordinates.
     pub uv: Vec2,
+    /// Where they end.
+    pub chart: Chart,
     /// Direction in which u grows, of any length; may be 0.
     pub dpdu: Vec3,
     /// Colour of a mesh, interpolated between its corners; 1 of all else.
@@ -52,6 +54,7 @@ impl SurfacePoint {
             ng: ng.as_vec3(),
             ns: ns.as_vec3(),
             uv: local.uv,
+            chart: local.chart,
             dpdu: dpdu.as_vec3(),
             color: local.color,
         }
@@ -132,7 +135,8 @@ impl Joined {
         let p = facet.p + self.shift;
         // Beyond the error of the facet: of the shift here, and of that back by the next ray.
         let p_error = (p.abs() + self.shift.abs()) * gamma_f64(4) + DVec3::splat(facet.error);
-        SurfacePoint { p, p_error, ng, ns, uv, dpdu: dpdu.as_vec3(), color }
+        let chart = tree.mesh.chart;
+        SurfacePoint { p, p_error, ng, ns, uv, chart, dpdu: dpdu.as_vec3(), color }
     }
 }
 
@@ -153,7 +157,8 @@ impl MeshTree {
         } else {
             (Vec2::ZERO, DVec3::ZERO, Rgb::ONE)
         };
-        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, dpdu, color, error: facet.error }
+        let (chart, error) = (self.mesh.chart, facet.error);
+        LocalSurface { p: facet.p, ng: facet.ng, ns, uv, chart, dpdu, color, error }
     }
 }
 

@@ -15,7 +15,7 @@ impl SceneGeometry<'_> {
     /// The point of a surface as the textures of an instance see it, at a time of the shutter.
     #[inline]
     pub fn texture_point(&self, instance: u32, surface: &SurfacePoint, time: f32) -> TexturePoint {
-        let at = TexturePoint { time, ..TexturePoint::at(surface.uv) };
+        let at = TexturePoint { time, ..TexturePoint::on(surface.chart, surface.uv) };
         let instance = &self.instances[instance as usize];
         if !instance.needs.place {
             return at;

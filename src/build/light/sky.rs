@@ -5,7 +5,7 @@
 //! over (Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed., section 12.5).
 
 use crate::description::{Rgb, Value};
-use crate::math::Frame;
+use crate::math::{Chart, Frame};
 use crate::sampling::Piecewise2D;
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf, uniform_sphere};
 use crate::shade::{MaterialTable, TexturePoint};
@@ -42,7 +42,8 @@ impl SkyLight {
                     .map(|(dx, dy)| {
                         let u = (x as f32 + dx) / width as f32;
                         let v = (y as f32 + dy) / height as f32;
-                        let color = materials.color(&radiance, &seen(Vec2::new(u, v)));
+                        let uv = Vec2::new(u, v);
+                        let color = materials.color(&radiance, &seen(uv_to_direction(uv), uv));
                         f64::from(crate::color::luminance(color))
                     })
                     .fold(0.0, f64::max);
@@ -73,12 +74,7 @@ impl SkyLight {
 
     /// Radiance from a unit direction in the light's own space.
     fn radiance_local(&self, direction: Vec3, materials: &MaterialTable) -> Rgb {
-        let at = TexturePoint {
-            p: direction.as_dvec3(),
-            n: -direction,
-            ..TexturePoint::at(direction_to_uv(direction))
-        };
-        materials.color(&self.radiance, &at) * self.scale
+        materials.color(&self.radiance, &seen(direction, direction_to_uv(direction))) * self.scale
     }
 
     /// Radiance from the unit direction `wi` of render space.
@@ -143,10 +139,11 @@ fn jacobian(v: f32) -> Option<f32> {
     (sin > 0.0).then(|| 1.0 / (TAU * PI * sin))
 }
 
-/// What a sky texture looks at: solid ones the unit sphere around the viewer.
-fn seen(uv: Vec2) -> TexturePoint {
-    let direction = uv_to_direction(uv);
-    TexturePoint { p: direction.as_dvec3(), n: -direction, ..TexturePoint::at(uv) }
+/// What a sky texture looks at: solid ones the unit sphere around the viewer; images close around it, and end above
+/// and below.
+fn seen(direction: Vec3, uv: Vec2) -> TexturePoint {
+    let at = TexturePoint::on(Chart::AROUND, uv);
+    TexturePoint { p: direction.as_dvec3(), n: -direction, ..at }
 }
 
 /// The light's space turned into render space: rotation only, directions stay unit.

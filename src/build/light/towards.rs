@@ -9,7 +9,7 @@ use super::{Emitted, Emitter, LightTable, ShapeLights};
 use crate::build::bvh::{SceneGeometry, SurfacePoint};
 use crate::description::{Light, Rgb};
 use crate::extract::{Geometry, NOTHING, PunctualLight};
-use crate::math::{Ray, gamma, offset_ray_origin};
+use crate::math::{Chart, Ray, gamma, offset_ray_origin};
 use crate::sampling::warp::uniform_cone;
 use crate::shade::{MaterialTable, TexturePoint};
 use crate::shape::{
@@ -370,7 +370,7 @@ impl Lights<'_> {
         let point = rectangle.sample(from.p, u);
         let wi = (point.p - from.p).try_normalize()?.as_vec3();
         let end = ShadowEnd::Surface { p: point.p, p_error: rectangle.p_error, n: rectangle.n };
-        let radiance = self.radiance_of(emitted, &TexturePoint::at(point.uv));
+        let radiance = self.radiance_of(emitted, &TexturePoint::on(Chart::SQUARE, point.uv));
         Some(LightSample { wi, radiance, pdf: point.pdf as f32, delta: false, end })
     }
 

@@ -97,6 +97,7 @@ pub fn divided_where_long(
         normals: extended(&mesh.normals, &edges, |a, b, _| (a + b).normalize_or(a)),
         uvs: extended(&mesh.uvs, &edges, |a, b, _| (a + b) * 0.5),
         colors: extended(&mesh.colors, &edges, |a, b, _| (a + b) * 0.5),
+        chart: mesh.chart,
         ..Default::default()
     };
     let parts = |(triangle, flags): (&[u32; 3], &[bool; 3])| {

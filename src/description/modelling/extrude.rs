@@ -1,7 +1,7 @@
 //! Plane figures drawn out into solids.
 
 use crate::description::TriangleMesh;
-use crate::math::Cubic;
+use crate::math::{Chart, Cubic};
 use earcut::Earcut;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use i_overlay::core::fill_rule::FillRule;
@@ -91,7 +91,7 @@ pub fn extruded(
     let points = || figures.iter().flatten().flatten();
     let low = points().fold(DVec2::INFINITY, |low, p| low.min(*p));
     let extent = points().fold(DVec2::NEG_INFINITY, |high, p| high.max(*p)) - low;
-    let mut mesh = TriangleMesh::default();
+    let mut mesh = TriangleMesh { chart: Chart::AROUND, ..Default::default() };
     for figure in &figures {
         for front in [true, false] {
             lid(figure, front, depth, |p| (p - low) / extent, &mut mesh);

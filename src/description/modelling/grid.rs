@@ -1,13 +1,14 @@
 //! A flat grid.
 
 use crate::description::TriangleMesh;
+use crate::math::Chart;
 use glam::{DVec2, Vec2, Vec3};
 
 /// A rectangle in the xy plane around the origin, facing +z, of so many cells of two triangles; uv is the unit
 /// square, as on the shape of that name.
 pub fn grid(size: DVec2, (columns, rows): (u32, u32)) -> TriangleMesh {
     let share = |k: u32, n: u32| f64::from(k) / f64::from(n);
-    let mut mesh = TriangleMesh::default();
+    let mut mesh = TriangleMesh { chart: Chart::SQUARE, ..Default::default() };
     for j in 0..=rows {
         for i in 0..=columns {
             let uv = DVec2::new(share(i, columns), share(j, rows));

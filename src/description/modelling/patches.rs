@@ -8,7 +8,7 @@
 
 use super::weld::{Weld, smooth_normals};
 use crate::description::TriangleMesh;
-use crate::math::{bezier_of_spline, clamped_knots};
+use crate::math::{Chart, bezier_of_spline, clamped_knots};
 use glam::{DVec2, DVec3, DVec4, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -178,6 +178,7 @@ pub fn patch_mesh(patches: &[Placed], n: u32) -> TriangleMesh {
         positions: vertices.iter().map(|vertex| vertex.0).collect(),
         normals: vertices.iter().map(|vertex| vertex.1).collect(),
         uvs: vertices.iter().map(|vertex| vertex.2).collect(),
+        chart: Chart::SQUARE,
         ..Default::default()
     };
     for patch in 0..patches.len() as u32 {

@@ -5,7 +5,7 @@
 //! mesh is within the error of the surface, and inside of it where that is convex.
 
 use crate::description::{Shape, TriangleMesh};
-use crate::math::{Piece, Profile};
+use crate::math::{Chart, Piece, Profile};
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -45,9 +45,15 @@ pub fn tessellated<R>(
         normal: normal.into(),
         v,
     };
-    let mut mesh = TriangleMesh::default();
-    match *shape {
+    let chart = match shape {
         Shape::Plane {} | Shape::Mesh(_) => return Err(TessellationError::NoSuchShape),
+        Shape::Rectangle { .. } | Shape::Box { .. } | Shape::Disk { .. } => Chart::SQUARE,
+        Shape::Sphere { .. } | Shape::Cylinder { .. } | Shape::Cone { .. } => Chart::AROUND,
+        Shape::Revolution { profile, .. } => profile.chart(),
+    };
+    let mut mesh = TriangleMesh { chart, ..Default::default() };
+    match *shape {
+        Shape::Plane {} | Shape::Mesh(_) => {}
         Shape::Rectangle { size } => face(&mut mesh, DVec3::ZERO, [DVec3::X, DVec3::Y], size),
         Shape::Box { size } => {
             // As seen from outside, u to the right; below and on top u grows along x.

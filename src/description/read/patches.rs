@@ -7,6 +7,7 @@ use super::surface::check_triangle_count;
 use crate::description::TriangleMesh;
 use crate::description::modelling::{Patch, Placed, Run, cells_for, patch_mesh, spline_patches};
 use crate::description::profile::check_knots;
+use crate::math::{Chart, Edge};
 use glam::{DVec2, DVec3, DVec4};
 
 /// Bézier patches by their control points.
@@ -90,7 +91,10 @@ pub(super) fn spline_mesh(
     let homogeneous = |(p, w): (&DVec3, &f64)| (*p * *w).extend(*w);
     let net: Vec<Vec<DVec4>> =
         rows.iter().zip(weights).map(|(p, w)| p.iter().zip(w).map(homogeneous).collect()).collect();
-    mesh_within(cursor, &spline_patches(&net, &[along_u, along_v]), tolerance, report)
+    let patches = spline_patches(&net, &[along_u, along_v]);
+    let edge = |closed: bool| if closed { Edge::Seam } else { Edge::Border };
+    let chart = Chart { u: edge(closed.0), v: edge(closed.1) };
+    Some(TriangleMesh { chart, ..mesh_within(cursor, &patches, tolerance, report)? })
 }
 
 /// How a surface runs along one of its sides.

@@ -12,6 +12,7 @@ use crate::description::{
     Curve, Dispersion, Displacement, Material, PhaseFunction, Relief, Rgb, Shape, TriangleMesh,
     Value, Wave,
 };
+use crate::math::Chart;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
 use serde::Deserialize;
@@ -420,7 +421,9 @@ pub(super) fn check_triangles(
     }
     let triangles = triangles.iter().map(|&(a, b, c)| [a, b, c]).collect();
     let tangents = Vec::new();
-    fine.then_some(TriangleMesh { positions, normals: unit, uvs, tangents, colors, triangles })
+    let chart = Chart::ENDLESS;
+    let mesh = TriangleMesh { positions, normals: unit, uvs, chart, tangents, colors, triangles };
+    fine.then_some(mesh)
 }
 
 /// Checks a grid; `None` when something in it is wrong.

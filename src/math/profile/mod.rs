@@ -13,7 +13,7 @@ pub(crate) use piece::bracketed_root;
 pub use piece::{Jet, Piece};
 pub(crate) use rings::{Child, MARGIN, MAX_LEVELS, Rings, WIDTH};
 
-use super::Cubic;
+use super::{Chart, Cubic};
 use glam::DVec2;
 use std::f64::consts::PI;
 
@@ -137,6 +137,12 @@ impl Profile {
     pub fn outward(&self, capped: bool) -> f64 {
         let closed = capped || self.open_ends == [None, None];
         if closed && self.volume < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// Where the coordinates of its surface end: v at the ends of the profile, unless that is a loop.
+    pub fn chart(&self) -> Chart {
+        let (first, last) = (&self.pieces[0], &self.pieces[self.pieces.len() - 1]);
+        if first.start == last.end { Chart::TORUS } else { Chart::AROUND }
     }
 
     /// Area of the surface, without ends.

@@ -3,12 +3,17 @@
 //! Texel `i` of `n` covers `[i, i + 1)/n`; its centre is `(i + ½)/n`. Each of the four taps of the
 //! bilinear filter is wrapped by itself, so that a repeating image has no seam. Coordinates are
 //! reduced in `f64`: at uv = 10⁷ an `f32` product with the resolution would have lost the texel.
+//!
+//! Where the surface ends, a tap beyond the end reads the last texel before it, at every level of the pyramid; where it
+//! closes, a tap beyond the seam reads what is there. Only what goes on repeats.
 
+use super::domain::{Domain, Interval};
 use super::pyramid::Pyramid;
 use crate::color::luminance;
 use crate::description::{
     Channel, Encoding, ImageData, ImagePixels, Rgb, TextureFilter, TextureFiltering, Wrap,
 };
+use crate::math::Edge;
 use glam::{DVec2, DVec3, Vec2, Vec4};
 use std::sync::LazyLock;
 
@@ -31,9 +36,11 @@ pub(super) struct Look {
     pub(super) wrap: Wrap,
     pub(super) filter: TextureFilter,
     pub(super) filtering: TextureFiltering,
+    pub(super) domain: Domain,
 }
 
-/// Most probes along the longer axis of a footprint; one that is longer still is looked at with wider probes.
+/// Most probes along the longer axis of a footprint; one that is longer still is looked at with wider probes, unless it
+/// goes around an axis of the surface: near a pole wider ones would reach far from it.
 const MOST_PROBES: f32 = 16.0;
 
 impl Look {
@@ -45,13 +52,15 @@ impl Look {
     /// Anisotropic Texture Mapping", SIGGRAPH 99).
     pub(super) fn filtered(self, pyramid: &Pyramid, uv: DVec2, axes: [Vec2; 2]) -> Vec4 {
         let image = &*pyramid.base;
+        let uv = self.domain.within(uv);
         let unfiltered = self.filter == TextureFilter::Nearest
             || self.filtering == TextureFiltering::Point
             || axes == [Vec2::ZERO; 2];
         if unfiltered {
-            return lookup(image, self.wrap, self.filter, uv);
+            return self.lookup(image, uv);
         }
         let size = Vec2::new(image.width as f32, image.height as f32);
+        let axes = axes.map(|axis| self.domain.shortened(axis));
         let [a, b] = axes.map(|axis| (axis * size).length());
         let (longer, axis) = if a >= b { (a, axes[0]) } else { (b, axes[1]) };
         let shorter = a.min(b);
@@ -61,12 +70,15 @@ impl Look {
         }
         match self.filtering {
             TextureFiltering::Anisotropic if longer > 1.0 => {
-                let width = shorter.max(longer / MOST_PROBES).max(1.0);
+                let around = axis.x.abs() > axis.y.abs() && self.domain.u().edge == Edge::Seam;
+                let widest = if around { 0.0 } else { longer / MOST_PROBES };
+                let width = shorter.max(widest).max(1.0);
                 let probes = (longer / width).ceil().max(1.0);
                 let mut sum = Vec4::ZERO;
                 for k in 0..probes as u32 {
                     let along = f64::from((k as f32 + 0.5) / probes - 0.5);
-                    sum += self.level(pyramid, width.log2(), uv + axis.as_dvec2() * along);
+                    let uv = self.domain.folded(uv + axis.as_dvec2() * along);
+                    sum += self.level(pyramid, width.log2(), uv);
                 }
                 sum / probes
             }
@@ -77,7 +89,7 @@ impl Look {
     /// Between two levels of a pyramid.
     fn level(self, pyramid: &Pyramid, level: f32, uv: DVec2) -> Vec4 {
         let last = pyramid.len() - 1;
-        let at = |level: usize| lookup(pyramid.level(level), self.wrap, self.filter, uv);
+        let at = |level: usize| self.lookup(pyramid.level(level), uv);
         if level <= 0.0 {
             return at(0);
         }
@@ -89,32 +101,103 @@ impl Look {
         let fine = at(below as usize);
         if share == 0.0 { fine } else { fine + (at(below as usize + 1) - fine) * share }
     }
+
+    /// Linear colour and coverage at `uv`. An axis whose coordinate is not finite reads texel 0.
+    #[inline]
+    fn lookup(self, image: &ImageData, uv: DVec2) -> Vec4 {
+        // Rows are stored from the top, v points up.
+        let across = Taps::new(self.wrap, image.width, self.domain.u(), uv.x);
+        let down = Taps::new(self.wrap, image.height, self.domain.v().flipped(), 1.0 - uv.y);
+        match self.filter {
+            TextureFilter::Nearest => {
+                texel(image, across.tap(across.x.floor() as i64), down.tap(down.x.floor() as i64))
+            }
+            TextureFilter::Bilinear => {
+                let (columns, tx) = across.pair();
+                let (rows, ty) = down.pair();
+                let [top, bottom] = rows.map(|row| {
+                    let [left, right] = columns.map(|column| texel(image, column, row));
+                    left + (right - left) * tx
+                });
+                top + (bottom - top) * ty
+            }
+        }
+    }
 }
 
-/// Linear colour and coverage at `uv`. An axis whose coordinate is not finite reads texel 0.
-#[inline]
-pub(super) fn lookup(image: &ImageData, wrap: Wrap, filter: TextureFilter, uv: DVec2) -> Vec4 {
-    let (width, height) = (image.width, image.height);
-    // Rows are stored from the top, v points up.
-    let x = texel_coordinate(uv.x, wrap, width);
-    let y = texel_coordinate(1.0 - uv.y, wrap, height);
-    match filter {
-        TextureFilter::Nearest => {
-            let column = tap(x.floor() as i64, wrap, width);
-            texel(image, column, tap(y.floor() as i64, wrap, height))
+/// What a lookup reads along one axis of an image.
+#[derive(Clone, Copy)]
+struct Taps {
+    wrap: Wrap,
+    size: u32,
+    /// Where it looks, in texels, reduced to about one period so that it converts to an integer.
+    x: f64,
+    edge: Edge,
+    /// The first texel that is laid on the surface and the one after the last, from the same origin.
+    first: i64,
+    end: i64,
+}
+
+impl Taps {
+    #[inline]
+    fn new(wrap: Wrap, size: u32, domain: Interval, u: f64) -> Self {
+        let n = f64::from(size);
+        let shift = match wrap {
+            Wrap::Repeat => u.floor(),
+            Wrap::Mirror => 2.0 * (0.5 * u).floor(),
+            Wrap::Clamp => 0.0,
+        };
+        let x = match wrap {
+            _ if !u.is_finite() => 0.5, // the centre of texel 0
+            Wrap::Clamp => u.clamp(0.0, 1.0) * n,
+            _ => (u - shift) * n,
+        };
+        let taps = Self { wrap, size, x, edge: Edge::Endless, first: 0, end: 0 };
+        if domain.edge == Edge::Endless || !u.is_finite() {
+            return taps;
         }
-        TextureFilter::Bilinear => {
-            let (x, y) = (x - 0.5, y - 0.5);
-            let (x0, y0) = (x.floor(), y.floor());
-            let (tx, ty) = ((x - x0) as f32, (y - y0) as f32);
-            let columns = [x0 as i64, x0 as i64 + 1].map(|x| tap(x, wrap, width));
-            let rows = [y0 as i64, y0 as i64 + 1].map(|y| tap(y, wrap, height));
-            let [top, bottom] = rows.map(|row| {
-                let [left, right] = columns.map(|column| texel(image, column, row));
-                left + (right - left) * tx
-            });
-            top + (bottom - top) * ty
-        }
+        // Places and repeats are `f32`: what of a texel lies beyond an edge by less than their rounding does not count.
+        let rounding = |bound: f64| bound.abs().max(1.0) * n * f64::from(f32::EPSILON);
+        let low = (domain.low - shift) * n + rounding(domain.low);
+        let high = (domain.high - shift) * n - rounding(domain.high);
+        let (first, end) = (low.floor() as i64, high.ceil() as i64);
+        // A seam within a texel joins what the image shows on both sides of it.
+        let whole = |bound: f64| {
+            let texels = bound * n;
+            (texels - texels.round()).abs() <= rounding(bound)
+        };
+        let meets = domain.edge == Edge::Border || (whole(domain.low) && whole(domain.high));
+        let edge = if meets && end > first { domain.edge } else { Edge::Endless };
+        Self { edge, first, end, ..taps }
+    }
+
+    /// The texel which a tap at integer position `i` reads; `i` lies at most one beyond the period.
+    #[inline]
+    fn tap(self, i: i64) -> u32 {
+        let i = match self.edge {
+            Edge::Endless => i,
+            Edge::Border => i.clamp(self.first, self.end - 1),
+            Edge::Seam => self.first + (i - self.first).rem_euclid(self.end - self.first),
+        };
+        let size = i64::from(self.size);
+        let wrapped = match self.wrap {
+            Wrap::Repeat => i.rem_euclid(size),
+            Wrap::Mirror => {
+                let i = i.rem_euclid(2 * size);
+                if i < size { i } else { 2 * size - 1 - i }
+            }
+            Wrap::Clamp => i.clamp(0, size - 1),
+        };
+        wrapped as u32
+    }
+
+    /// The texels between whose centres it looks, and the share of the second.
+    #[inline]
+    fn pair(self) -> ([u32; 2], f32) {
+        let x = self.x - 0.5;
+        let below = x.floor();
+        let i = below as i64;
+        ([self.tap(i), self.tap(i + 1)], (x - below) as f32)
     }
 }
 
@@ -149,35 +232,6 @@ pub(super) fn range(image: &ImageData, wanted: Channel) -> [f32; 2] {
     values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
-/// A coordinate in texels, reduced to about one period so that it converts to an integer.
-#[inline]
-fn texel_coordinate(u: f64, wrap: Wrap, size: u32) -> f64 {
-    if !u.is_finite() {
-        return 0.5; // the centre of texel 0
-    }
-    let reduced = match wrap {
-        Wrap::Repeat => u - u.floor(),
-        Wrap::Mirror => u - 2.0 * (0.5 * u).floor(),
-        Wrap::Clamp => u.clamp(0.0, 1.0),
-    };
-    reduced * f64::from(size)
-}
-
-/// The texel which a tap at integer position `i` reads; `i` lies at most one beyond the period.
-#[inline]
-fn tap(i: i64, wrap: Wrap, size: u32) -> u32 {
-    let size = i64::from(size);
-    let wrapped = match wrap {
-        Wrap::Repeat => i.rem_euclid(size),
-        Wrap::Mirror => {
-            let i = i.rem_euclid(2 * size);
-            if i < size { i } else { 2 * size - 1 - i }
-        }
-        Wrap::Clamp => i.clamp(0, size - 1),
-    };
-    wrapped as u32
-}
-
 #[inline]
 pub(super) fn texel(image: &ImageData, column: u32, row: u32) -> Vec4 {
     let index = row as usize * image.width as usize + column as usize;
@@ -204,6 +258,7 @@ pub(super) fn texel(image: &ImageData, column: u32, row: u32) -> Vec4 {
 #[expect(clippy::float_cmp, reason = "values which are passed through unchanged")]
 mod tests {
     use super::*;
+    use crate::math::Chart;
     use TextureFilter::{Bilinear, Nearest};
 
     fn gray(width: u32, height: u32, f: impl Fn(u32, u32) -> f32) -> ImageData {
@@ -217,8 +272,13 @@ mod tests {
         ImageData { width, height, pixels: ImagePixels::Rgba32F(pixels) }
     }
 
+    fn look(wrap: Wrap, filter: TextureFilter, chart: Chart) -> Look {
+        let filtering = TextureFiltering::Anisotropic;
+        Look { wrap, filter, filtering, domain: Domain::new(chart) }
+    }
+
     fn value(image: &ImageData, wrap: Wrap, filter: TextureFilter, u: f64, v: f64) -> f32 {
-        lookup(image, wrap, filter, DVec2::new(u, v)).x
+        look(wrap, filter, Chart::ENDLESS).lookup(image, DVec2::new(u, v)).x
     }
 
     /// Oracle: the 18 % grey of the sRGB standard has the code 118, and 0 and 255 are the ends.
@@ -228,7 +288,8 @@ mod tests {
         for (encoding, red) in [(Encoding::Srgb, 0.18), (Encoding::Linear, 118.0 / 255.0)] {
             let pixels = ImagePixels::Rgba8(codes.clone(), encoding);
             let image = ImageData { width: 1, height: 1, pixels };
-            let t = lookup(&image, Wrap::Repeat, Bilinear, DVec2::new(0.3, 0.7));
+            let t =
+                look(Wrap::Repeat, Bilinear, Chart::ENDLESS).lookup(&image, DVec2::new(0.3, 0.7));
             assert!((t.x - red).abs() < 0.002, "{encoding:?}: {t}");
             assert_eq!((t.y, t.z), (0.0, 1.0));
             assert!((t.w - 128.0 / 255.0).abs() < 1e-6, "coverage is never sRGB: {t}");
@@ -327,5 +388,85 @@ mod tests {
     fn the_average_is_the_mean_of_linear_pixels() {
         let image = gray(3, 2, |column, row| (column + 3 * row) as f32);
         assert_eq!(average(&image), Rgb::splat(2.5));
+    }
+
+    /// What a look at every edge may see: rows and columns that differ, of which those at opposite ends are as far apart
+    /// as they can be.
+    fn ramp(columns: u32, rows: u32) -> Pyramid {
+        let image = gray(columns, rows, |column, row| 100.0 * column as f32 + row as f32);
+        Pyramid::new(std::sync::Arc::new(image), true)
+    }
+
+    /// Oracle: writing out the taps. Beyond an end there is the last texel, beyond a seam the other end, whatever the
+    /// image repeats, is shifted or mirrored by; a quarter turn goes along.
+    #[test]
+    fn taps_beyond_an_edge_read_what_the_surface_has_there() {
+        let pyramid = ramp(4, 8);
+        let at = |chart: Chart, wrap: Wrap, m: [f64; 2], offset: DVec2, uv: DVec2| {
+            let m = glam::DMat2::from_diagonal(DVec2::from(m));
+            let domain = Domain::new(chart).placed(m, offset);
+            let look = Look { domain, ..look(wrap, Bilinear, chart) };
+            look.filtered(&pyramid, m * uv + offset, [Vec2::ZERO; 2]).x
+        };
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            let once =
+                |chart, u: f64, v: f64| at(chart, wrap, [1.0, 1.0], DVec2::ZERO, DVec2::new(u, v));
+            for end in [1.0, 1.0 - 1e-9, 0.97] {
+                assert_eq!(once(Chart::SQUARE, 0.125, end), 0.0, "{wrap:?}: the top row");
+                assert_eq!(once(Chart::SQUARE, 0.125, 1.0 - end), 7.0, "{wrap:?}: the lowest row");
+                assert_eq!(once(Chart::SQUARE, end, 0.9375), 300.0, "{wrap:?}: the last column");
+            }
+            // Halfway between the last column and the first, whatever the wrap.
+            for u in [0.0, 1.0] {
+                assert_eq!(once(Chart::AROUND, u, 0.9375), 150.0, "{wrap:?}");
+                assert_eq!(once(Chart::TORUS, u, 0.9375), 150.0, "{wrap:?}");
+            }
+            assert_eq!(once(Chart::TORUS, 0.125, 0.0), 3.5, "{wrap:?}");
+        }
+        // Twice around and three times up: the image's own edges meet within, as it repeats, and not at the ends.
+        let thrice = |v: f64| {
+            at(Chart::AROUND, Wrap::Repeat, [2.0, 3.0], DVec2::ZERO, DVec2::new(0.0625, v))
+        };
+        assert_eq!((thrice(0.0), thrice(1.0)), (7.0, 0.0));
+        assert!((thrice(1.0 / 3.0) - 3.5).abs() < 1e-5);
+        // Upside down, and shifted by whole images.
+        let turned = |v: f64| {
+            at(Chart::AROUND, Wrap::Repeat, [1.0, -1.0], DVec2::new(0.0, 5.0), DVec2::new(0.125, v))
+        };
+        assert_eq!((turned(0.0), turned(1.0)), (0.0, 7.0));
+        // Shifted by a half, an end lies where the image goes on.
+        let shifted = at(
+            Chart::AROUND,
+            Wrap::Repeat,
+            [1.0, 1.0],
+            DVec2::new(0.0, 0.5),
+            DVec2::new(0.125, 0.0),
+        );
+        assert_eq!(shifted, 3.0);
+    }
+
+    /// Around a pole a footprint is as long as a turn, or longer, and still narrow: it sees the rows that it covers and none
+    /// from the other end, at any level of the pyramid. Oracle: the mean row over the part of the footprint that is
+    /// on the surface.
+    #[test]
+    fn footprints_at_a_pole_stay_there() {
+        let (columns, rows) = (64_u32, 32_u32);
+        let image = gray(columns, rows, |_, row| (row as f32 + 0.5) / rows as f32);
+        let pyramid = Pyramid::new(std::sync::Arc::new(image), true);
+        let look = look(Wrap::Repeat, Bilinear, Chart::AROUND);
+        for turns in [0.5, 1.0, 40.0, 1e9] {
+            for high in [1.0, 2.0, 4.0] {
+                let high = high / rows as f32;
+                let axes = [Vec2::new(turns, 0.0), Vec2::new(0.0, high)];
+                for (v, expected) in [(1.0, 0.0), (0.0, 1.0)] {
+                    let seen = look.filtered(&pyramid, DVec2::new(0.3, v), axes).x;
+                    assert!((seen - expected).abs() <= high, "{turns} {high} {v}: {seen}");
+                }
+            }
+        }
+        // Standing up, over half of the image: it is folded at the end.
+        let upright = [Vec2::new(1.0 / 64.0, 0.0), Vec2::new(0.0, 0.5)];
+        let seen = look.filtered(&pyramid, DVec2::new(0.3, 1.0), upright).x;
+        assert!((seen - 0.125).abs() < 0.02, "{seen}");
     }
 }

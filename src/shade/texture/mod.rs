@@ -5,6 +5,7 @@
 //! of a sample is replaced by its mean: images by a pyramid, patterns in closed form, noise octave by
 //! octave.
 
+mod domain;
 mod grid;
 mod image;
 mod moments;
@@ -14,6 +15,7 @@ mod pyramid;
 mod range;
 mod solid;
 
+pub use domain::Domain;
 pub use moments::Moments;
 pub use point::TexturePoint;
 pub use pyramid::Pyramid;
@@ -22,6 +24,7 @@ pub use range::{Ranges, Region};
 use crate::color::luminance;
 use crate::color::spectrum::{WavelengthSet, color_of};
 use crate::description::{Falloff, GridData, ImageData, Rgb, Texture, TextureFiltering, Value};
+use crate::math::Chart;
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
 use pattern::Wall;
 use solid::Octaves;
@@ -355,7 +358,10 @@ impl Textures {
     fn sample<T: Sample>(&self, index: u32, at: &TexturePoint) -> T {
         match &self.list[index as usize] {
             Texture::Image { file, wrap, filter, repeat, offset, channel, .. } => {
-                let look = image::Look { wrap: *wrap, filter: *filter, filtering: self.filtering };
+                let domain =
+                    at.domain.placed(DMat2::from_diagonal(repeat.as_dvec2()), offset.as_dvec2());
+                let look =
+                    image::Look { wrap: *wrap, filter: *filter, filtering: self.filtering, domain };
                 // In f64: far coordinates keep their texel.
                 let uv = at.uv.as_dvec2() * repeat.as_dvec2() + offset.as_dvec2();
                 let axes = at.axes.map(|axis| axis * *repeat);
@@ -431,8 +437,7 @@ impl Textures {
                 self.sample::<T>(*of, at).each(|value| remap(value, *from, *to, *smooth))
             }
             Texture::Placed { of, repeat, rotation, offset } => {
-                let turn = DMat2::from_angle(f64::from(*rotation).to_radians());
-                let m = turn * DMat2::from_diagonal(repeat.as_dvec2());
+                let m = domain::turn(*rotation) * DMat2::from_diagonal(repeat.as_dvec2());
                 self.sample(*of, &at.placed(m, offset.as_dvec2()))
             }
             Texture::Triplanar { of, size, sharpness } => {
@@ -452,7 +457,8 @@ impl Textures {
         let sides = [DVec2::new(-p.z, p.y), DVec2::new(p.x, -p.z), DVec2::new(p.x, p.y)];
         let axes = [Vec2::X, Vec2::Y].map(|axis| axis * (at.width / size));
         let seen = |side: usize| {
-            let at = TexturePoint { uv: sides[side].as_vec2(), axes, ..*at };
+            let (uv, domain) = (sides[side].as_vec2(), Domain::new(Chart::ENDLESS));
+            let at = TexturePoint { uv, domain, axes, ..*at };
             self.sample::<T>(of, &at) * weights[side]
         };
         let mut sum = T::of_color(Vec3::ZERO);

@@ -1,6 +1,8 @@
 //! What a texture looks at: a point of a surface, and how much of the surface one sample stands for.
 
+use super::domain::Domain;
 use crate::description::Rgb;
+use crate::math::Chart;
 use glam::{DMat2, DVec2, DVec3, Vec2, Vec3};
 
 /// A point of a surface, as textures see it.
@@ -8,6 +10,8 @@ use glam::{DMat2, DVec2, DVec3, Vec2, Vec3};
 pub struct TexturePoint {
     /// Surface coordinates.
     pub uv: Vec2,
+    /// Which uv there are.
+    pub domain: Domain,
     /// Place in the space of the object, metres before its transform. Only where a texture asks for it, as
     /// all that follows; 0 elsewhere.
     pub p: DVec3,
@@ -28,8 +32,14 @@ pub struct TexturePoint {
 impl TexturePoint {
     /// A point of which nothing is known but uv; textures are not filtered there.
     pub const fn at(uv: Vec2) -> Self {
+        Self::on(Chart::ENDLESS, uv)
+    }
+
+    /// The same where surface coordinates end as a chart says.
+    pub const fn on(chart: Chart, uv: Vec2) -> Self {
         Self {
             uv,
+            domain: Domain::new(chart),
             p: DVec3::ZERO,
             n: Vec3::Z,
             color: Rgb::ONE,
@@ -59,6 +69,7 @@ impl TexturePoint {
     #[must_use]
     pub(super) fn placed(mut self, m: DMat2, offset: DVec2) -> Self {
         self.uv = (m * self.uv.as_dvec2() + offset).as_vec2();
+        self.domain = self.domain.placed(m, offset);
         self.axes = self.axes.map(|axis| (m * axis.as_dvec2()).as_vec2());
         self
     }

@@ -4,7 +4,7 @@
 //! steep it can be; of patterns the bounds are those of their colours.
 
 use super::solid::{self, Octaves};
-use super::{TexturePoint, Textures, grid, image, pattern, remap};
+use super::{TexturePoint, Textures, domain, grid, image, pattern, remap};
 use crate::color::luminance;
 use crate::color::spectrum::color_of;
 use crate::description::{CellFeature, Falloff, Rgb, Texture, Value};
@@ -195,7 +195,7 @@ impl<'a> Ranges<'a> {
                 hull([ends[0]; 2], [ends[1]; 2])
             }
             Texture::Placed { of, repeat, rotation, offset } => {
-                let turn = DMat2::from_angle(f64::from(*rotation).to_radians());
+                let turn = domain::turn(*rotation);
                 let m = turn * DMat2::from_diagonal(repeat.as_dvec2());
                 let middle = m * (0.5 * (region.uv[0] + region.uv[1])) + offset.as_dvec2();
                 let half = 0.5 * (region.uv[1] - region.uv[0]);

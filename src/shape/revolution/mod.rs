@@ -13,7 +13,7 @@ mod meet;
 mod meridian;
 
 use super::{AreaFactor, CanonicalPoint, LocalHit, LocalRay, LocalSurface, longitude};
-use crate::math::{Aabb, Piece, Profile};
+use crate::math::{Aabb, Chart, Piece, Profile};
 use crate::sampling::warp::square_to_disk;
 use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 use std::f64::consts::{PI, TAU};
@@ -94,7 +94,7 @@ impl Revolution {
         };
         let across = DVec3::new(radial.z, 0.0, -radial.x);
         let p = radial * on_profile.x.max(0.0) + DVec3::Y * on_profile.y;
-        LocalSurface { error, ..LocalSurface::smooth(p, normal, uv, across) }
+        LocalSurface { error, ..LocalSurface::smooth(p, normal, uv, self.profile.chart(), across) }
     }
 
     /// `∂p/∂u` and `∂p/∂v` at a point of a face.
@@ -121,7 +121,13 @@ impl Revolution {
         let side = if end == 0 { -self.outward() } else { self.outward() };
         let (x, z) = (p.x / rim.x, p.z / rim.x);
         let uv = (0.5 + 0.5 * x, 0.5 - 0.5 * z * side);
-        LocalSurface::smooth(DVec3::new(p.x, rim.y, p.z), DVec3::Y * side, uv, DVec3::X)
+        LocalSurface::smooth(
+            DVec3::new(p.x, rim.y, p.z),
+            DVec3::Y * side,
+            uv,
+            Chart::SQUARE,
+            DVec3::X,
+        )
     }
 
     /// Evenly by area over all faces.
