@@ -38,7 +38,7 @@ fn texture(name: &str) -> (ImageData, Vec<[u8; 4]>) {
 }
 
 fn mesh(name: &str) -> TriangleMesh {
-    load_mesh(&in_repository(name)).unwrap()
+    load_mesh(&in_repository(name), &mut Vec::new()).unwrap()
 }
 
 /// Pixels are compared, not bytes: another version of the encoder may compress better. Every

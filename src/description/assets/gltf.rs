@@ -505,22 +505,22 @@ mod tests {
         std::fs::write(folder.path().join("my data/b.bin"), &bytes).unwrap();
         document["buffers"][0]["uri"] = json!("my%20data/b.bin");
         std::fs::write(&path, document.to_string()).unwrap();
-        assert_eq!(load_mesh(&path).unwrap().triangles.len(), 2);
+        assert_eq!(load_mesh(&path, &mut Vec::new()).unwrap().triangles.len(), 2);
         let absolute = folder.path().join("my data/b.bin").display().to_string();
         let hostile =
             ["../b.bin", "%2e%2e/b.bin", "a/../../b", "http://host/b", "", "%", "%00", &absolute];
         for uri in hostile {
             document["buffers"][0]["uri"] = json!(uri);
             std::fs::write(&path, document.to_string()).unwrap();
-            let error = load_mesh(&path).unwrap_err();
+            let error = load_mesh(&path, &mut Vec::new()).unwrap_err();
             assert!(matches!(error, AssetError::OutsideFile { .. }), "{uri}: {error}");
         }
         document["buffers"][0]["uri"] = json!("absent.bin");
         std::fs::write(&path, document.to_string()).unwrap();
-        assert!(load_mesh(&path).unwrap_err().to_string().contains("absent.bin"));
+        assert!(load_mesh(&path, &mut Vec::new()).unwrap_err().to_string().contains("absent.bin"));
         document["buffers"][0]["uri"] = json!("data:application/octet-stream;base64,AAAA");
         std::fs::write(&path, document.to_string()).unwrap();
-        assert!(load_mesh(&path).unwrap_err().to_string().contains("expected 98"));
+        assert!(load_mesh(&path, &mut Vec::new()).unwrap_err().to_string().contains("expected 98"));
     }
 
     #[cfg(unix)]
@@ -535,7 +535,10 @@ mod tests {
         document["buffers"][0]["uri"] = json!("b.bin");
         let path = inside.join("square.gltf");
         std::fs::write(&path, document.to_string()).unwrap();
-        assert!(matches!(load_mesh(&path).unwrap_err(), AssetError::OutsideFile { .. }));
+        assert!(matches!(
+            load_mesh(&path, &mut Vec::new()).unwrap_err(),
+            AssetError::OutsideFile { .. }
+        ));
     }
 
     /// Whatever the bytes: an error or a sound mesh.

@@ -2,7 +2,9 @@
 
 use super::{AssetError, MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, read_file, too_large};
 use crate::description::{Encoding, ImageData, ImagePixels};
-use exr::prelude::{ReadChannels, ReadLayers};
+use exr::meta::attribute::Text;
+use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
@@ -14,9 +16,10 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 ///
 /// * 8-bit PNG and JPEG keep their codes, to be decoded by `encoding` at lookup.
 /// * 16-bit PNG is decoded to linear `f32` by `encoding` here.
+/// * A PNG or JPEG that says how the camera was held (the EXIF tag `Orientation`) is turned upright.
 /// * Radiance HDR and OpenEXR hold linear `f32`, whatever `encoding` says. Of an OpenEXR file the
-///   first part with the channels R, G and B is read, and its A (1 where there is none); its data
-///   window is the picture.
+///   first part with the channels R, G and B is read, or else the first with one channel, as grey, and its A (1 where
+///   there is none); its data window is the picture.
 ///
 /// Colours are taken as they are in Rec. 709 primaries: profiles and chromaticities are not read.
 ///
@@ -70,10 +73,14 @@ fn decode(bytes: &[u8], encoding: Encoding, path: &Path) -> Result<ImageData, As
     let mut limits = Limits::default();
     limits.max_alloc = Some(MAX_IMAGE_BYTES);
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(failed)?;
+    let mut decoder = reader.into_decoder().map_err(failed)?;
     let (width, height) = decoder.dimensions();
     check_size(width.into(), height.into(), path)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(failed)?;
+    // What is no sound tag says nothing.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(failed)?;
+    image.apply_orientation(orientation);
+    let (width, height) = (image.width(), image.height());
     Ok(ImageData { width, height, pixels: pixels(image, encoding) })
 }
 
@@ -131,25 +138,75 @@ fn read_exr(bytes: &[u8], path: &Path) -> Result<ImageData, AssetError> {
     for header in &metadata.headers {
         check_size(header.layer_size.0 as u64, header.layer_size.1 as u64, path)?;
     }
+    // Colour, or else one number for each pixel, which is grey.
+    let names: Vec<Vec<&Text>> = metadata
+        .headers
+        .iter()
+        .map(|header| header.channels.list.iter().map(|channel| &channel.name).collect())
+        .collect();
+    let is_colour =
+        |part: &Vec<&Text>| ["R", "G", "B"].iter().all(|c| part.iter().any(|n| Text::eq(n, c)));
+    let alone = |part: &Vec<&Text>| {
+        let mut others = part.iter().filter(|name| !Text::eq(name, "A"));
+        others.next().filter(|_| others.next().is_none()).map(|name| (*name).clone())
+    };
+    let found = if names.iter().any(is_colour) {
+        read_exr_part(bytes, ["R", "G", "B"].map(Text::from))
+    } else if let Some(channel) = names.iter().find_map(alone) {
+        read_exr_channel(bytes, channel)
+    } else {
+        let list =
+            |part: &Vec<&Text>| part.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>();
+        let found = names.iter().map(|part| list(part).join(", ")).collect::<Vec<_>>().join("; ");
+        return Err(AssetError::Channels { path: path.to_owned(), found });
+    };
+    found.map_err(failed)
+}
+
+/// The first part with these channels.
+fn read_exr_part(bytes: &[u8], [r, g, b]: [Text; 3]) -> exr::error::Result<ImageData> {
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
-        .rgba_channels(
-            |size, _| (size.0, vec![[0.0_f32; 4]; size.0 * size.1]),
-            |(width, pixels), at, (r, g, b, a): (f32, f32, f32, f32)| {
-                pixels[at.1 * *width + at.0] = [r, g, b, a];
-            },
-        )
+        .specific_channels()
+        .required(r)
+        .required(g)
+        .required(b)
+        .optional("A", 1.0)
+        .collect_pixels(blank, |(width, pixels), at, (r, g, b, a): (f32, f32, f32, f32)| {
+            pixels[at.1 * *width + at.0] = [r, g, b, a];
+        })
         .first_valid_layer()
         .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(failed)?;
-    let size = image.layer_data.size;
-    Ok(ImageData {
-        width: size.0 as u32,
-        height: size.1 as u32,
-        pixels: ImagePixels::Rgba32F(image.layer_data.channel_data.pixels.1),
-    })
+        .from_buffered(Cursor::new(bytes))?;
+    Ok(of_floats(image.layer_data.size, image.layer_data.channel_data.pixels))
+}
+
+/// The first part with this channel, as grey.
+fn read_exr_channel(bytes: &[u8], channel: Text) -> exr::error::Result<ImageData> {
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required(channel)
+        .optional("A", 1.0)
+        .collect_pixels(blank, |(width, pixels), at, (v, a): (f32, f32)| {
+            pixels[at.1 * *width + at.0] = [v, v, v, a];
+        })
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))?;
+    Ok(of_floats(image.layer_data.size, image.layer_data.channel_data.pixels))
+}
+
+/// Its width and the pixels of a part before they are read.
+fn blank<Channels>(size: exr::math::Vec2<usize>, _: &Channels) -> (usize, Vec<[f32; 4]>) {
+    (size.0, vec![[0.0; 4]; size.0 * size.1])
+}
+
+fn of_floats(size: exr::math::Vec2<usize>, pixels: (usize, Vec<[f32; 4]>)) -> ImageData {
+    let (width, height) = (size.0 as u32, size.1 as u32);
+    ImageData { width, height, pixels: ImagePixels::Rgba32F(pixels.1) }
 }
 
 #[cfg(test)]
@@ -243,6 +300,92 @@ mod tests {
         assert_eq!((image.width, image.height), (3, 2));
         assert_eq!(pixels[1].map(f32::to_bits), [1.0, 0.5, 1e6, 1.0].map(f32::to_bits));
         assert_eq!(pixels[5].map(f32::to_bits), [2.0, 1.5, 1e6, 1.0].map(f32::to_bits));
+    }
+
+    /// Oracle: the numbers that were written. One channel of any name is grey, with or without coverage; of several that
+    /// are no colours all are told.
+    #[test]
+    fn exr_of_one_channel_is_grey() {
+        use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, SmallVec, WritableImage};
+        let written = |names: &[&str]| {
+            let channel = |(k, name): (usize, &&str)| {
+                let samples = (0..6).map(|i| (10 * k + i) as f32 / 8.0).collect();
+                AnyChannel::new(*name, FlatSamples::F32(samples))
+            };
+            let list: SmallVec<[_; 4]> = names.iter().enumerate().map(channel).collect();
+            let mut bytes = Vec::new();
+            Image::from_channels((3, 2), AnyChannels::sort(list))
+                .write()
+                .to_buffered(Cursor::new(&mut bytes))
+                .unwrap();
+            parse(&bytes, Encoding::Srgb, Path::new("one.exr"))
+        };
+        for name in ["Y", "R", "Z", "height"] {
+            let image = written(&[name]).unwrap();
+            let ImagePixels::Rgba32F(pixels) = image.pixels else { panic!("floats") };
+            assert_eq!((image.width, image.height), (3, 2));
+            assert_eq!(pixels[5], [0.625, 0.625, 0.625, 1.0], "{name}");
+        }
+        let ImagePixels::Rgba32F(pixels) = written(&["Y", "A"]).unwrap().pixels else {
+            panic!("floats")
+        };
+        assert_eq!(pixels[1], [0.125, 0.125, 0.125, 1.375]);
+        let told = written(&["diffuse.R", "Z"]).unwrap_err().to_string();
+        assert!(told.contains("`Z`") && told.contains("`diffuse.R`"), "{told}");
+    }
+
+    /// An EXIF block with one tag, the orientation of the picture: TIFF 6.0, big-endian.
+    fn exif(orientation: u8) -> Vec<u8> {
+        let mut tiff = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
+        tiff.extend([orientation, 0, 0, 0, 0, 0, 0]);
+        tiff
+    }
+
+    /// Oracle: Exif 2.32, section 4.6.4, table of `Orientation`: where row 0 and column 0 of what is stored belong. A
+    /// picture of 24 × 16 whose lower left corner is white.
+    #[test]
+    fn pictures_are_turned_as_their_camera_was_held() {
+        let stored = ImageBuffer::from_fn(24, 16, |x, y| {
+            let white = x < 8 && y >= 8;
+            Rgb([if white { 255_u8 } else { 0 }; 3])
+        });
+        let (left, top) = (true, true);
+        let corners = [
+            (1, (left, !top)),
+            (2, (!left, !top)),
+            (3, (!left, top)),
+            (4, (left, top)),
+            (5, (!left, top)),
+            (6, (left, top)),
+            (7, (left, !top)),
+            (8, (!left, !top)),
+            // No such number: as it is stored.
+            (9, (left, !top)),
+        ];
+        for (orientation, (at_left, at_top)) in corners {
+            let mut jpeg = encoded(stored.clone(), ImageFormat::Jpeg);
+            let block = [&b"Exif\0\0"[..], &exif(orientation)].concat();
+            let length = (block.len() as u16 + 2).to_be_bytes();
+            jpeg.splice(2..2, [&[0xff, 0xe1][..], &length, &block].concat());
+            let mut png = encoded(stored.clone(), ImageFormat::Png);
+            let mut chunk = [&b"eXIf"[..], &exif(orientation)].concat();
+            let crc = crc32(&chunk);
+            chunk.splice(0..0, (chunk.len() as u32 - 4).to_be_bytes());
+            chunk.extend(crc.to_be_bytes());
+            // After the signature and the header.
+            png.splice(33..33, chunk);
+            for bytes in [jpeg, png] {
+                let image = parse(&bytes, Encoding::Linear, Path::new("held")).unwrap();
+                let (width, height) = (image.width as usize, image.height as usize);
+                let on_its_side = (5..=8).contains(&orientation);
+                assert_eq!((width, height), if on_its_side { (16, 24) } else { (24, 16) });
+                let ImagePixels::Rgba8(codes, _) = image.pixels else { panic!("8 bits") };
+                for (x, y) in [(3, 3), (width - 4, 3), (3, height - 4), (width - 4, height - 4)] {
+                    let white = (x == 3) == at_left && (y == 3) == at_top;
+                    assert_eq!(codes[y * width + x][0] > 127, white, "{orientation}: {x}, {y}");
+                }
+            }
+        }
     }
 
     /// An image is known by its contents: a wrong ending does no harm.

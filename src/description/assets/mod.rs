@@ -62,10 +62,16 @@ pub enum AssetError {
     )]
     Image { path: PathBuf, cause: ::image::ImageError },
     #[error(
-        "`{path}` is not a sound OpenEXR file with the channels R, G and B: {cause}",
+        "`{path}` is not a sound OpenEXR file: {cause}",
         path = .path.display()
     )]
     Exr { path: PathBuf, cause: exr::error::Error },
+    #[error(
+        "`{path}` has the channels {found}; expected R, G and B, or a single one, which is grey: write the layer that \
+         is meant to a file of its own",
+        path = .path.display()
+    )]
+    Channels { path: PathBuf, found: String },
     #[error(
         "`{path}` is {width} × {height} pixels; expected at least 1 × 1",
         path = .path.display()
@@ -102,13 +108,15 @@ pub enum AssetError {
 /// * Tangents are read from glTF; one of a vertex whose normal was replaced is left out.
 /// * Triangles of zero area are dropped, and vertices that no triangle uses.
 ///
+/// What was read otherwise than it is written is put into words in `remarks`.
+///
 /// # Errors
 /// When the file cannot be read, is malformed, holds positions or texture coordinates which are not
 /// finite, exceeds a limit of this module, or has no triangle of positive area.
-pub fn load_mesh(path: &Path) -> Result<TriangleMesh, AssetError> {
+pub fn load_mesh(path: &Path, remarks: &mut Vec<String>) -> Result<TriangleMesh, AssetError> {
     match mesh_format(path)? {
         MeshFormat::Obj => {
-            let mesh = obj::parse(&read_file(path)?, path)?;
+            let mesh = obj::parse(&read_file(path)?, path, remarks)?;
             tidy::tidy(mesh, path)
         }
         MeshFormat::Gltf => {
@@ -172,9 +180,9 @@ mod tests {
 
     #[test]
     fn a_missing_file_and_an_unknown_ending_are_named_in_the_error() {
-        let error = load_mesh(Path::new("nowhere/rabbit.obj")).unwrap_err();
+        let error = load_mesh(Path::new("nowhere/rabbit.obj"), &mut Vec::new()).unwrap_err();
         assert!(error.to_string().contains("rabbit.obj"), "{error}");
-        let error = load_mesh(Path::new("rabbit.stl")).unwrap_err();
+        let error = load_mesh(Path::new("rabbit.stl"), &mut Vec::new()).unwrap_err();
         assert!(error.to_string().contains("`.stl`") && error.to_string().contains("`.glb`"));
         let error = load_image(Path::new("nowhere/wood.png"), Encoding::Srgb).unwrap_err();
         assert!(error.to_string().contains("wood.png"), "{error}");

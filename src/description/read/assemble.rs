@@ -14,7 +14,7 @@ use super::texture::read_texture;
 use super::waves::check_waves;
 use super::{ContentHash, LoadOptions, Names, entity, relations};
 use crate::description::assets::{MAX_FILE_BYTES, load_grid, load_image, load_mesh};
-use crate::description::diagnostic::{Diagnostics, SourceText, suggestion};
+use crate::description::diagnostic::{Diagnostic, Diagnostics, SourceText, suggestion};
 use crate::description::modelling::{grid, subdivided};
 use crate::description::{
     Clock, Displacement, Encoding, Filter, GridData, ImageData, PhotonSettings, RenderSettings,
@@ -87,6 +87,7 @@ pub(super) fn assemble(
         images: HashMap::new(),
         grids: HashMap::new(),
         meshes: HashMap::new(),
+        remarks: Vec::new(),
     };
     for (name, cursor) in &names.textures {
         let texture = read_texture(cursor, names, report);
@@ -107,6 +108,7 @@ pub(super) fn assemble(
     relations::check_absorption(&scene, names, report);
     scene.content_hash = assets.hash.0.digest128();
     scene.warnings = relations::warnings(&scene, names);
+    scene.warnings.0.append(&mut assets.remarks);
     if report.found.has_errors() {
         Err(in_order(std::mem::take(&mut report.found)))
     } else {
@@ -371,6 +373,8 @@ struct Assets<'o> {
     images: HashMap<(PathBuf, Encoding), Arc<ImageData>>,
     grids: HashMap<PathBuf, Arc<GridData>>,
     meshes: HashMap<PathBuf, Arc<TriangleMesh>>,
+    /// What was read otherwise than it is written.
+    remarks: Vec<Diagnostic>,
 }
 
 impl Assets<'_> {
@@ -577,10 +581,15 @@ impl Assets<'_> {
                 if let Some(mesh) = self.meshes.get(&path) {
                     return Some(mesh.clone());
                 }
-                let mesh = load_mesh(&path).map_err(|error| {
+                let mut remarks = Vec::new();
+                let mesh = load_mesh(&path, &mut remarks).map_err(|error| {
                     let message = format!("this mesh cannot be used: {error}");
                     report.at("scene::asset", &place, message);
                 });
+                let remarks = remarks.into_iter();
+                let warned =
+                    remarks.map(|text| relations::warning("scene::asset", text, Some(&place)));
+                self.remarks.extend(warned);
                 let mesh = Arc::new(mesh.ok()?);
                 self.hash_mesh(&mesh);
                 Some(self.meshes.entry(path).or_insert(mesh).clone())

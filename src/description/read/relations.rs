@@ -379,7 +379,8 @@ pub(super) fn warnings(scene: &SceneDescription, names: &Names) -> Diagnostics {
     Diagnostics(warnings)
 }
 
-fn warning(code: &'static str, message: String, cursor: Option<&Cursor>) -> Diagnostic {
+/// A warning about the value or the entry at a place.
+pub(super) fn warning(code: &'static str, message: String, cursor: Option<&Cursor>) -> Diagnostic {
     Diagnostic {
         severity: Severity::Warning,
         code,
