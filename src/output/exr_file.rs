@@ -9,6 +9,7 @@
 //! and `aperture`. Text is UTF-8, as OpenEXR has it since its version 2.0.
 
 use super::picture::to_half;
+use super::seal::{BLANK, seal};
 use super::{Fingerprint, OutputError, SOFTWARE, write_atomically};
 use crate::color::CHROMATICITIES;
 use crate::description::{ExrLayout, Layer, RenderSettings, SceneDescription};
@@ -152,6 +153,7 @@ pub fn write_exr(
         .write()
         .to_buffered(Cursor::new(&mut bytes))
         .map_err(|source| OutputError::Exr { path: path.to_owned(), source })?;
+    seal(&mut bytes);
     write_atomically(path, &bytes)?;
     Ok(saturated)
 }
@@ -184,6 +186,15 @@ fn size_of(part: Tile) -> Vec2<usize> {
     Vec2(part.size().0 as usize, part.size().1 as usize)
 }
 
+/// What the attribute holds: the facts, and in the first part, which is the beauty, the checksum of the file.
+#[derive(Serialize)]
+struct Facts<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    checksum: Option<&'a str>,
+    #[serde(flatten)]
+    metadata: &'a FrameMetadata,
+}
+
 /// The display window is the whole picture.
 fn image_attributes(film: &Film) -> ImageAttributes {
     let whole = size_of(Tile::whole(film.size()));
@@ -199,7 +210,8 @@ fn layer_attributes(
     film: &Film,
     metadata: &FrameMetadata,
 ) -> Result<LayerAttributes, OutputError> {
-    let json = serde_json::to_string(metadata).map_err(|source| OutputError::Json { source })?;
+    let facts = Facts { checksum: (layer == Layer::Beauty).then_some(BLANK), metadata };
+    let json = serde_json::to_string(&facts).map_err(|source| OutputError::Json { source })?;
     let mut attributes = LayerAttributes::named(layer_name(layer));
     attributes.layer_position = Vec2(film.window().x0 as i32, film.window().y0 as i32);
     attributes.software_name = Some(text(&metadata.software));

@@ -14,6 +14,7 @@ mod manifest;
 mod memory;
 mod picture;
 mod resume;
+mod seal;
 
 pub use atomic::{check_writable, write_atomically};
 pub use develop::{PngFacts, develop, develop_exr, read_png_facts, write_png};
