@@ -211,7 +211,11 @@ fn only_what_is_missing_or_damaged_is_made_again() {
     assert_eq!(made(&[]), (vec![], 0));
     fs::write(out.join(files[0]), &whole[0][..whole[0].len() / 2]).expect("writable");
     fs::remove_file(out.join(files[1])).expect("was written");
-    assert_eq!(made(&[]), (vec![2], 1));
+    let mut flipped = fs::read(out.join("a.0003.exr")).expect("was written");
+    let last = flipped.len() - 1; // of the pixels of the last layer
+    flipped[last] ^= 1;
+    fs::write(out.join("a.0003.exr"), flipped).expect("writable");
+    assert_eq!(made(&[]), (vec![2, 3], 1));
     let again = files.map(|name| fs::read(out.join(name)).expect("was written"));
     assert!(again == whole, "to the byte");
     assert_eq!(made(&["--seed", "5"]), (vec![0, 1, 2, 3], 0));
@@ -484,6 +488,65 @@ fn paths_that_are_not_unicode_work() {
     }
 }
 
+/// One run of 100,000 small frames is at work; it is killed in the end, and never finishes.
+#[cfg(unix)]
+#[test]
+fn a_folder_belongs_to_one_job_at_a_time_until_its_process_ends_however_it_ends() {
+    let folder = folder();
+    let film = folder.path().join("film");
+    for (name, emission) in [("one", "0.5"), ("two", "0.6")] {
+        fs::create_dir(folder.path().join(name)).expect("writable");
+        let scene = SCENE.replace("(0.5, 0.25", &format!("({emission}, 0.25"));
+        fs::write(folder.path().join(name).join("a.ron"), scene).expect("writable");
+    }
+    let words = |scene: &'static str, frames: &'static str| {
+        ["render", scene, "--size", "8x8", "--samples", "2", "--out", "film", "--frames", frames]
+    };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kinora"));
+    command.current_dir(folder.path()).args(words("one/a.ron", "0-99999"));
+    let mut first = command.stderr(Stdio::null()).spawn().expect("it starts");
+    wait_for(&film.join("a.0002.exr"));
+
+    let other = kinora(folder.path(), &words("two/a.ron", "0"));
+    assert_eq!(other.status.code(), Some(74));
+    for part in ["film", "one/a.ron", &first.id().to_string(), "--out"] {
+        assert!(stderr(&other).contains(part), "no {part:?} in: {}", stderr(&other));
+    }
+    let same = kinora(folder.path(), &words("one/a.ron", "200000-200002"));
+    assert_eq!(same.status.code(), Some(0), "side by side: {}", stderr(&same));
+    fs::write(film.join(".kinora-killed.tmp"), "half a picture").expect("writable");
+    let living = fs::File::create(film.join(".kinora-living.tmp")).expect("writable");
+    living.lock().expect("nobody else has it");
+    first.kill().expect("SIGKILL");
+    first.wait().expect("was started");
+
+    let recorded = |film: &Path| {
+        let record = fs::read(film.join("manifest.json")).expect("was written");
+        let record: serde_json::Value = serde_json::from_slice(&record).expect("is JSON");
+        let frames = record["frames"].as_array().expect("list").iter();
+        frames.map(|f| f["frame"].as_u64().expect("number")).collect::<Vec<_>>()
+    };
+    let frames = recorded(&film);
+    for frame in [0, 1, 200_000, 200_001, 200_002] {
+        assert!(frames.contains(&frame), "{frame} of {frames:?}");
+    }
+    let other = kinora(folder.path(), &words("two/a.ron", "0-1"));
+    assert_eq!(other.status.code(), Some(0), "{}", stderr(&other));
+    assert_eq!(recorded(&film), [0, 1]);
+    let hidden: Vec<_> = names_in(&film).into_iter().filter(|n| n.starts_with('.')).collect();
+    assert_eq!(hidden, [".kinora-living.tmp"], "what the living hold is left to them");
+}
+
+fn wait_for(file: &Path) {
+    for _ in 0..2000 {
+        if file.exists() {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("{} does not come", file.display());
+}
+
 /// The manifest is the first file of a run: when it is there, the render is under way.
 #[cfg(unix)]
 #[test]
@@ -496,13 +559,7 @@ fn a_termination_signal_ends_with_code_75_and_nothing_torn() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    let manifest = folder.path().join("out/a/manifest.json");
-    for _ in 0..2000 {
-        if manifest.exists() {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    wait_for(&folder.path().join("out/a/manifest.json"));
     let killed = Command::new("kill").arg(child.id().to_string()).status().expect("kill exists");
     assert!(killed.success());
     let status = child.wait().expect("was started");

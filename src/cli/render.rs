@@ -47,8 +47,8 @@ pub fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     }
     let mut job = Job::new(arguments, control)?;
     let facts = RunFacts::new(&job.scene, &arguments.scene.overrides, rayon::current_num_threads());
-    let mut manifest = Manifest::open(&job.folder, facts, &job.fingerprint);
-    manifest.save()?;
+    let mut manifest = Manifest::open(&job.folder, facts, &job.fingerprint)?;
+    job.find_pending(arguments.fresh);
 
     let mut summary = Summary::new(job.kept(), job.undeveloped.len());
     let mut progress = Progress::new(arguments.progress, &job.control, job.pending.len());
@@ -104,30 +104,36 @@ impl Job {
             )?,
         };
         let fingerprint = JobFingerprint::new(&scene);
-        let state = |&frame: &i32| {
-            if arguments.fresh {
-                return FrameState::Missing;
-            }
-            let files = FrameFiles::new(&folder, &name, frame);
-            frame_state(&files, fingerprint.of_frame(frame), scene.render.development())
-        };
-        let states: Vec<FrameState> = frames.frames().par_iter().map(state).collect();
-        let those = |wanted: FrameState| {
-            let all = frames.frames().iter().zip(&states);
-            all.filter(|&(_, &state)| state == wanted).map(|(&frame, _)| frame).collect()
-        };
-        let (pending, undeveloped) = (those(FrameState::Missing), those(FrameState::Undeveloped));
         Ok(Self {
             scene,
             scene_path,
             frames,
-            pending,
-            undeveloped,
+            pending: Vec::new(),
+            undeveloped: Vec::new(),
             folder,
             name,
             fingerprint,
             control,
         })
+    }
+
+    /// Looks which frames are to be rendered, or to be developed at least.
+    fn find_pending(&mut self, fresh: bool) {
+        let development = self.scene.render.development();
+        let state = |&frame: &i32| {
+            if fresh {
+                return FrameState::Missing;
+            }
+            let files = FrameFiles::new(&self.folder, &self.name, frame);
+            frame_state(&files, self.fingerprint.of_frame(frame), development)
+        };
+        let states: Vec<FrameState> = self.frames.frames().par_iter().map(state).collect();
+        let those = |wanted: FrameState| {
+            let all = self.frames.frames().iter().zip(&states);
+            all.filter(|&(_, &state)| state == wanted).map(|(&frame, _)| frame).collect()
+        };
+        (self.pending, self.undeveloped) =
+            (those(FrameState::Missing), those(FrameState::Undeveloped));
     }
 
     /// How many frames were found finished.

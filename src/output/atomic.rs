@@ -1,7 +1,8 @@
 //! Files that exist whole or not at all.
 
 use super::OutputError;
-use std::io::Write;
+use std::fs::{self, DirEntry, File};
+use std::io::{self, Write};
 use std::path::Path;
 use tempfile::{Builder, NamedTempFile};
 
@@ -11,10 +12,18 @@ use tempfile::{Builder, NamedTempFile};
 /// # Errors
 /// When the folder or the disk refuses; the target is then what it was before.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    replace_atomically(path, |file| file.write_all(bytes))
+}
+
+/// As [`write_atomically`], for what is written piece by piece.
+pub(super) fn replace_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> io::Result<()>,
+) -> Result<(), OutputError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     let mut file = temporary_beside(path).map_err(failed)?;
     // On the plain file: tempfile's own `Write` adds the temporary name to every message.
-    file.as_file_mut().write_all(bytes).map_err(failed)?;
+    write(file.as_file_mut()).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
     file.persist(path).map_err(|error| failed(error.error))?;
     Ok(())
@@ -32,18 +41,55 @@ pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
         .map_err(|source| OutputError::NotWritable { folder: folder.to_owned(), source })
 }
 
+/// Removes the temporary files which writers that were killed have left in `folder`; the lock that a living writer has
+/// on its file tells them apart.
+pub(super) fn remove_abandoned(folder: &Path) {
+    let abandoned = |entry: &DirEntry| {
+        let name = entry.file_name();
+        let ours = name.to_str().is_some_and(|n| n.starts_with(PREFIX) && n.ends_with(SUFFIX));
+        // Nothing but a plain file is opened: a pipe would wait for its other end.
+        ours && entry.file_type().is_ok_and(|kind| kind.is_file())
+    };
+    for entry in fs::read_dir(folder_of(&folder.join(PREFIX)))
+        .into_iter()
+        .flatten()
+        .flatten()
+        .filter(abandoned)
+    {
+        let Ok(file) = File::open(entry.path()) else { continue };
+        if file.try_lock().is_ok() {
+            let _ = fs::remove_file(entry.path()); // another has done it, or nobody may
+        }
+    }
+}
+
+/// The folder of a file, by a name that can be opened.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// What the names of temporary files begin and end with.
+const PREFIX: &str = ".kinora-";
+const SUFFIX: &str = ".tmp";
+
 /// A file that vanishes when it is dropped, with the permissions of an ordinary new file (tempfile's own
-/// default would let nobody else read the pictures).
+/// default would let nobody else read the pictures), and locked until then.
 fn temporary_beside(path: &Path) -> std::io::Result<NamedTempFile> {
     let mut builder = Builder::new();
-    builder.prefix(".kinora-").suffix(".tmp");
+    builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666)); // reduced by the umask
     }
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-    builder.tempfile_in(folder.unwrap_or(Path::new(".")))
+    loop {
+        let file = builder.tempfile_in(folder_of(path))?;
+        // Where a file system has no locks, nothing is ever taken for abandoned. Where it has them, another process may
+        // have taken the file for that before it was locked.
+        if file.as_file().lock().is_err() || file.path().exists() {
+            return Ok(file);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -69,6 +115,25 @@ mod tests {
         // A folder in the place of the file lets everything succeed but the last step.
         assert!(matches!(write_atomically(&target, b"data"), Err(OutputError::Write { .. })));
         assert_eq!(std::fs::read_dir(folder.path()).expect("exists").count(), 1);
+    }
+
+    /// A lock belongs to the opened file, so that this process is as good as another one.
+    #[test]
+    fn files_of_the_dead_are_removed_and_those_of_the_living_are_not() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let at = |name: &str| folder.path().join(name);
+        let living = temporary_beside(&at("a.exr")).expect("writable");
+        for name in [".kinora-x1Y2z3.tmp", ".kinora-kept", "kinora-kept.tmp", "a.exr"] {
+            fs::write(at(name), b"half").expect("writable");
+        }
+        fs::create_dir(at(".kinora-folder.tmp")).expect("writable");
+        remove_abandoned(folder.path());
+        assert!(!at(".kinora-x1Y2z3.tmp").exists());
+        for name in [".kinora-kept", "kinora-kept.tmp", "a.exr", ".kinora-folder.tmp"] {
+            assert!(at(name).exists(), "{name}");
+        }
+        assert!(living.path().exists());
+        living.persist(at("b.exr")).expect("still there");
     }
 
     #[test]

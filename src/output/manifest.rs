@@ -1,19 +1,21 @@
 //! `manifest.json`: what was rendered, how, and what it took.
 //!
-//! One object: the run at the top, then `frames`, sorted by number. It is written anew, atomically, after
-//! every frame, so that it is right at any moment. A run which goes on with earlier frames keeps
+//! One object: the run at the top, then `frames`, one on each line. It is right after every frame, and sorted by number
+//! when nobody is at work in the folder, see [`Record`]. A run which goes on with earlier frames keeps
 //! their entries; entries whose fingerprint no longer fits are dropped, for they describe
 //! pictures of another scene.
 
-use super::{Fingerprint, FrameFiles};
-use super::{JobFingerprint, MANIFEST_NAME, OutputError, SOFTWARE, write_atomically};
+use super::atomic::remove_abandoned;
+use super::claim::FolderClaim;
+use super::record::{Places, Record, to_json};
+use super::{Fingerprint, FrameFiles, JobFingerprint, MANIFEST_NAME, OutputError, SOFTWARE};
 use crate::description::{Clock, Layer, RenderSettings, SceneDescription};
 use crate::extract::object_ids;
 use crate::frame::FrameReport;
 use serde::Serialize;
-use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use xxhash_rust::xxh3::xxh3_128;
 
 /// The run as a whole.
 #[derive(Clone, Debug, Serialize)]
@@ -52,6 +54,12 @@ impl RunFacts {
             threads,
             objects: objects(scene),
         }
+    }
+
+    /// What runs that may share a folder agree in: the job, and how its pictures are developed and stored.
+    fn id(&self, job: &JobFingerprint) -> Result<Fingerprint, OutputError> {
+        let settings = to_json(&self.settings)?;
+        Ok(Fingerprint(xxh3_128(&[job.of_frame(0).to_string().as_bytes(), &settings].concat())))
     }
 }
 
@@ -97,68 +105,66 @@ impl FrameEntry {
     }
 }
 
-/// The record of the run in an output folder.
+/// The record of the run in an output folder, and this process's claim on that folder.
 #[derive(Debug)]
 pub struct Manifest {
-    path: PathBuf,
-    run: RunFacts,
-    frames: BTreeMap<i32, Value>,
+    record: Record,
+    claim: FolderClaim,
+    /// Where the entries of earlier runs stand.
+    earlier: Places,
 }
 
 impl Manifest {
     /// Starts the record of a run in `folder`, with the entries of earlier runs that still hold: those
-    /// whose fingerprint is the one that `job` gives their frame.
+    /// whose fingerprint is the one that `job` gives their frame. Temporary files of runs that were killed go.
     ///
-    /// A record that cannot be read is started anew; the pictures themselves say what is done.
-    pub fn open(folder: &Path, run: RunFacts, job: &JobFingerprint) -> Self {
-        let path = folder.join(MANIFEST_NAME);
-        let earlier: Option<Value> =
-            std::fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        let entries = earlier.as_ref().and_then(|record| record.get("frames")?.as_array());
-        let frames = entries
-            .into_iter()
-            .flatten()
-            .filter_map(|entry| {
-                let frame = i32::try_from(entry.get("frame")?.as_i64()?).ok()?;
-                let fingerprint = entry.get("fingerprint")?.as_str()?;
-                (fingerprint == job.of_frame(frame).to_string()).then(|| (frame, entry.clone()))
-            })
-            .collect();
-        Self { path, run, frames }
+    /// Runs of one job may share a folder, each with other frames; the first of them starts the record. Of a record that
+    /// breaks off, what stands before that is kept; the pictures themselves say what is done.
+    ///
+    /// # Errors
+    /// When a run of another job is at work in the folder, or when the record cannot be written.
+    pub fn open(folder: &Path, run: RunFacts, job: &JobFingerprint) -> Result<Self, OutputError> {
+        remove_abandoned(folder);
+        let scene = run.scene_files.first().map_or("a scene", String::as_str);
+        let by = format!("`{scene}` (process {})", std::process::id());
+        let id = run.id(job)?;
+        let record = Record::new(folder.join(MANIFEST_NAME), &run, job)?;
+        let mut earlier = Places::new();
+        let renew = || record.renew().map(|places| earlier = places);
+        let claim = FolderClaim::new(folder, id, &by, renew)?;
+        Ok(Self { record, claim, earlier })
     }
 
-    /// Adds a frame, in the place of an earlier entry for it, and writes the record.
+    /// Adds a frame, in the place of an earlier entry for it.
     ///
     /// # Errors
     /// When the record cannot be written.
     pub fn record(&mut self, entry: &FrameEntry) -> Result<(), OutputError> {
-        let value = serde_json::to_value(entry).map_err(|source| OutputError::Json { source })?;
-        self.frames.insert(entry.frame, value);
-        self.save()
-    }
-
-    /// Writes the record as it is.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn save(&self) -> Result<(), OutputError> {
-        #[derive(Serialize)]
-        struct Record<'a> {
-            #[serde(flatten)]
-            run: &'a RunFacts,
-            frames: Vec<&'a Value>,
+        let text = to_json(entry)?;
+        if !self.record.append(&text)? {
+            self.earlier = self.record.renew()?; // somebody has removed or changed the file
+            self.record.append(&text)?;
         }
-        let record = Record { run: &self.run, frames: self.frames.values().collect() };
-        let mut bytes =
-            serde_json::to_vec_pretty(&record).map_err(|source| OutputError::Json { source })?;
-        bytes.push(b'\n');
-        write_atomically(&self.path, &bytes)
+        match self.earlier.remove(&entry.frame) {
+            Some(place) => self.record.blank(entry.frame, place),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Drop for Manifest {
+    /// Puts the entries in order, if nobody else is at work in the folder.
+    fn drop(&mut self) {
+        // Where that fails, every frame is in the record all the same.
+        self.claim.leave(|| drop(self.record.renew()));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::Value;
+    use std::fs;
 
     fn entry(frame: i32, job: &JobFingerprint) -> FrameEntry {
         let files = FrameFiles::new(Path::new("out"), "a", frame);
@@ -175,43 +181,84 @@ mod tests {
     }
 
     fn frames_of(folder: &Path) -> Vec<u64> {
-        let bytes = std::fs::read(folder.join(MANIFEST_NAME)).expect("was written");
+        let bytes = fs::read(folder.join(MANIFEST_NAME)).expect("was written");
         let record: Value = serde_json::from_slice(&bytes).expect("is JSON");
         assert_eq!(record["settings"]["samples"], 64);
         let frames = record["frames"].as_array().expect("a list");
         frames.iter().map(|f| f["report"]["frame"].as_u64().expect("a number")).collect()
     }
 
+    /// A run of a scene with this content, which records `frames`.
+    fn record(folder: &Path, content: u128, frames: &[i32]) -> Manifest {
+        let scene = SceneDescription { content_hash: content, ..Default::default() };
+        let job = JobFingerprint::new(&scene);
+        let facts = RunFacts::new(&scene, &[], 2);
+        let mut manifest = Manifest::open(folder, facts, &job).expect("writable");
+        for &frame in frames {
+            manifest.record(&entry(frame, &job)).expect("writable");
+        }
+        manifest
+    }
+
     #[test]
     fn a_later_run_keeps_the_entries_that_still_hold() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        let mut scene = SceneDescription::default();
-        let job = JobFingerprint::new(&scene);
-        let facts = RunFacts::new(&scene, &[], 2);
-        let mut first = Manifest::open(folder.path(), facts.clone(), &job);
-        first.record(&entry(10, &job)).expect("writable");
-        first.record(&entry(2, &job)).expect("writable");
+        drop(record(folder.path(), 1, &[10, 2]));
         assert_eq!(frames_of(folder.path()), [2, 10]);
-
-        let mut second = Manifest::open(folder.path(), facts.clone(), &job);
-        second.record(&entry(3, &job)).expect("writable");
+        drop(record(folder.path(), 1, &[3]));
         assert_eq!(frames_of(folder.path()), [2, 3, 10]);
-
-        scene.content_hash = 99;
-        let other = JobFingerprint::new(&scene);
-        let mut third = Manifest::open(folder.path(), facts, &other);
-        third.record(&entry(1, &other)).expect("writable");
+        drop(record(folder.path(), 99, &[1]));
         assert_eq!(frames_of(folder.path()), [1]);
     }
 
     #[test]
-    fn a_broken_record_is_started_anew() {
+    fn a_frame_rendered_again_replaces_its_entry_at_once() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        std::fs::write(folder.path().join(MANIFEST_NAME), b"{ \"frames\": [ {").expect("writable");
+        drop(record(folder.path(), 1, &[0, 1, 2]));
+        let run = record(folder.path(), 1, &[1, 2, 7]);
+        assert_eq!(frames_of(folder.path()), [0, 1, 2, 7]);
+        drop(run);
+        assert_eq!(frames_of(folder.path()), [0, 1, 2, 7]);
+        let only = record(folder.path(), 1, &[0, 1, 2, 7]);
+        assert_eq!(frames_of(folder.path()), [0, 1, 2, 7]);
+        drop(only);
+    }
+
+    #[test]
+    fn runs_of_one_job_share_a_folder_and_those_of_another_wait() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let first = record(folder.path(), 1, &[0, 2]);
+        let second = record(folder.path(), 1, &[1, 3]);
         let scene = SceneDescription::default();
-        let job = JobFingerprint::new(&scene);
-        let mut manifest = Manifest::open(folder.path(), RunFacts::new(&scene, &[], 1), &job);
-        manifest.record(&entry(0, &job)).expect("writable");
-        assert_eq!(frames_of(folder.path()), [0]);
+        let other = |scene: &SceneDescription| {
+            Manifest::open(folder.path(), RunFacts::new(scene, &[], 2), &JobFingerprint::new(scene))
+        };
+        assert!(matches!(other(&scene), Err(OutputError::InUse { .. })));
+        drop(first);
+        assert!(matches!(other(&scene), Err(OutputError::InUse { .. })));
+        assert_eq!(frames_of(folder.path()), [0, 2, 1, 3]);
+        drop(second);
+        assert_eq!(frames_of(folder.path()), [0, 1, 2, 3]);
+        other(&scene).expect("nobody is at work any more");
+        let names =
+            fs::read_dir(folder.path()).expect("exists").map(|e| e.expect("name").file_name());
+        assert_eq!(names.collect::<Vec<_>>(), [MANIFEST_NAME], "and nothing else remains");
+    }
+
+    #[test]
+    fn a_record_that_breaks_off_is_kept_up_to_there() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join(MANIFEST_NAME);
+        for broken in [&b"{ \"frames\": [ {"[..], b"", b"5", b"[1, 2", b"{\"frames\": 7}", b"\xff"]
+        {
+            fs::write(&path, broken).expect("writable");
+            drop(record(folder.path(), 1, &[0]));
+            assert_eq!(frames_of(folder.path()), [0]);
+        }
+        drop(record(folder.path(), 1, &[1, 2]));
+        let whole = fs::read(&path).expect("was written");
+        fs::write(&path, &whole[..whole.len() - 60]).expect("writable");
+        drop(record(folder.path(), 1, &[5]));
+        assert_eq!(frames_of(folder.path()), [0, 1, 5]);
     }
 }

@@ -7,12 +7,14 @@
 //! [`frame_state`].
 
 mod atomic;
+mod claim;
 mod develop;
 mod exr_file;
 mod fingerprint;
 mod manifest;
 mod memory;
 mod picture;
+mod record;
 mod resume;
 mod seal;
 
@@ -41,6 +43,8 @@ pub enum OutputError {
     Folder { folder: PathBuf, source: io::Error },
     #[error("cannot write into the folder `{}`; check its permissions and free space, or choose another with --out", .folder.display())]
     NotWritable { folder: PathBuf, source: io::Error },
+    #[error("another render is at work in the folder `{}`: {}; wait for its end, or choose another folder with --out", .folder.display(), .by.escape_debug())]
+    InUse { folder: PathBuf, by: String },
     #[error("cannot write `{}`; check the free space and the permissions of its folder", .path.display())]
     Write { path: PathBuf, source: io::Error },
     #[error("cannot encode `{}` as EXR", .path.display())]
