@@ -6,11 +6,12 @@ use crate::build::light::LightTable;
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::{Layer, SceneDescription};
 use crate::extract::{
-    CameraFacts, ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances,
+    CameraFacts, ChosenIntegrator, DicingRefused, Emissions, Feature, Instance, Instances, Meshes,
     Requirements, Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError, Tile};
-use crate::integrate::{IntegrateStatus, PhotonReport};
+use crate::integrate::{IntegrateStatus, PhotonReport, film_memory};
+use crate::memory::Shortage;
 use crate::shade::nesting::NestingFaults;
 use crate::world::{Camera, FrameClock, Settings};
 use crate::{build, extract, integrate, step};
@@ -20,7 +21,7 @@ use bevy_ecs::schedule::{
 };
 use bevy_ecs::system::ScheduleSystem;
 use serde::Serialize;
-use std::collections::{BTreeMap, TryReserveError};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
@@ -147,8 +148,8 @@ pub enum RenderError {
     TreeMemory {
         /// What they would take.
         megabytes: usize,
-        /// What the system answered.
-        source: TryReserveError,
+        /// What there is.
+        source: Shortage,
     },
     /// What glows is to be lit by photons.
     #[error(
@@ -352,7 +353,7 @@ impl Simulation {
             return Err(RenderError::Dicing { mesh, triangles, megabytes, limit });
         }
         let memory = self.world.resource::<TreeMemory>();
-        if let Some(source) = memory.refused.clone() {
+        if let Some(source) = memory.refused {
             let megabytes = memory.forecast / 1_000_000;
             self.world.resource_mut::<Instances>().mark_unseen();
             return Err(RenderError::TreeMemory { megabytes, source });
@@ -465,6 +466,18 @@ impl Simulation {
             rebuilt.push(format!("lights: {}", lights.len()));
         }
         rebuilt
+    }
+
+    /// Bytes that the frame prepared last takes, by what holds them, before it is rendered: its tables, trees that are
+    /// built already, and the film. Photons come on top, as many as `photons.max_memory` allows.
+    pub fn memory(&self) -> Vec<(&'static str, u64)> {
+        let settings = &self.world.resource::<Settings>().0;
+        let mut all = self.table_bytes();
+        let meshes = &self.world.resource::<Meshes>().list;
+        all.push(("meshes", meshes.iter().map(|mesh| mesh.memory() as u64).sum()));
+        let method = self.world.resource::<ChosenIntegrator>().method;
+        all.push(("film", film_memory(settings, method)));
+        all
     }
 
     fn table_bytes(&self) -> Vec<(&'static str, u64)> {

@@ -115,6 +115,7 @@ pub mod film;
 pub mod frame;
 pub mod integrate;
 pub mod math;
+pub mod memory;
 pub mod output;
 pub mod sampling;
 pub mod shade;

@@ -1,14 +1,15 @@
 //! Whether there is memory for the trees of a frame, asked before they are built.
 //!
 //! A tree which cannot be held would end the program in the midst of its building, or drown the machine.
-//! Its size follows from the number of triangles ([`WideTree::forecast`]), so the system is asked for
-//! as much first: what it refuses becomes an error of the frame.
+//! Its size follows from the number of triangles ([`WideTree::forecast`]), so [`ask`] is asked for
+//! as much first: what there is not becomes an error of the frame.
 
 use super::bvh::{MeshTrees, RestingTree, WideTree};
 use crate::extract::{Meshes, RestingMeshes};
+use crate::memory::{Shortage, ask};
 use crate::world::Settings;
 use bevy_ecs::prelude::*;
-use std::collections::{HashSet, TryReserveError};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// The memory that the trees of new meshes will take.
@@ -16,8 +17,8 @@ use std::sync::Arc;
 pub struct TreeMemory {
     /// Bytes of the trees to be built in this frame, before they are; 0 when none is.
     pub forecast: usize,
-    /// What the system answered, when it does not have them.
-    pub refused: Option<TryReserveError>,
+    /// What is missing, when there are not so many.
+    pub refused: Option<Shortage>,
 }
 
 /// Writes [`TreeMemory`] when a mesh was added, replaced or removed, when others stand still than before,
@@ -56,17 +57,12 @@ pub fn forecast_tree_memory(
         .filter(|(slot, mesh)| !joined.contains(slot) && !known.contains(&Arc::as_ptr(mesh)));
     let own: usize = own.map(|(_, mesh)| WideTree::forecast(mesh.triangles.len(), quality)).sum();
     let forecast = own + RestingTree::forecast(&resting.0, &meshes.list, quality);
-    *memory = TreeMemory { forecast, refused: ask_for(forecast).err() };
+    *memory = TreeMemory { forecast, refused: ask(forecast as u64).err() };
 }
 
 /// Whether the trees of this frame can be held.
 pub(crate) fn trees_fit(memory: Res<TreeMemory>) -> bool {
     memory.refused.is_none()
-}
-
-/// Asks the system for memory and gives it back.
-fn ask_for(bytes: usize) -> Result<(), TryReserveError> {
-    Vec::<u8>::new().try_reserve_exact(bytes)
 }
 
 #[cfg(test)]
@@ -91,7 +87,7 @@ mod tests {
         world.spawn(Camera::default());
         let mesh = world.spawn(Mesh::new(Arc::new(mesh))).id();
         world.spawn(Shape::Mesh(mesh));
-        world.resource_mut::<TreeMemory>().refused = ask_for(usize::MAX).err();
+        world.resource_mut::<TreeMemory>().refused = ask(u64::MAX).err();
         assert!(world.resource::<TreeMemory>().refused.is_some(), "no machine has that");
         simulation.prepare_frame(0).expect("five triangles fit");
         let forecast =
@@ -155,7 +151,7 @@ mod tests {
     /// What a frame whose trees do not fit says.
     #[test]
     fn a_refusal_names_the_size() {
-        let source = ask_for(usize::MAX).expect_err("no machine has that");
+        let source = ask(u64::MAX).expect_err("no machine has that");
         let error = RenderError::TreeMemory { megabytes: 12, source };
         assert!(error.to_string().contains("12 MB"), "{error}");
     }

@@ -117,6 +117,18 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl TriangleMesh {
+    /// Bytes of its lists.
+    pub fn memory(&self) -> usize {
+        size_of_val(&self.positions[..])
+            + size_of_val(&self.normals[..])
+            + size_of_val(&self.uvs[..])
+            + size_of_val(&self.tangents[..])
+            + size_of_val(&self.colors[..])
+            + size_of_val(&self.triangles[..])
+    }
+}
+
 fn one() -> f64 {
     1.0
 }

@@ -3,8 +3,8 @@
 use super::{FirstHit, PixelSample, Seen, Tile, moments};
 use crate::color::spectrum::WavelengthSet;
 use crate::description::{Background, Layer, LayerFilter, RenderSettings, Rgb};
+use crate::memory::{Shortage, ask};
 use glam::{DVec2, DVec3};
-use std::collections::TryReserveError;
 
 /// Side of a tile in pixels: small enough to balance the load, large enough that its buffer (some
 /// 100 kB with every layer) is filled from the cache.
@@ -19,7 +19,11 @@ pub enum FilmError {
     #[error(
         "no memory for a film of {width} × {height} pixels; render it smaller or with fewer layers"
     )]
-    Memory { width: u32, height: u32, source: TryReserveError },
+    Memory { width: u32, height: u32, source: Shortage },
+    #[error(
+        "no memory for the photons of a pass; set `photons.per_pass` or `photons.max_memory` lower"
+    )]
+    Photons(#[source] Shortage),
 }
 
 /// Sums over all samples of all pixels, row by row from the top left.
@@ -123,14 +127,20 @@ impl Film {
         if width == 0 || height == 0 {
             return Err(FilmError::Empty { width, height });
         }
-        let sums = Sums::new(window.area(), layers, alpha).map_err(|source| FilmError::Memory {
-            width,
-            height,
-            source,
-        })?;
+        let failed = |source| FilmError::Memory { width, height, source };
+        let each = Sums::bytes_each(layers, alpha);
+        ask((window.area() as u64).saturating_mul(each)).map_err(failed)?;
+        let sums = Sums::new(window.area(), layers, alpha);
         let layers = layers.to_vec();
         let layer_filter = LayerFilter::Mean;
         Ok(Self { size, window, layers, alpha, layer_filter, sums, non_finite: 0 })
+    }
+
+    /// Bytes that the film of these settings takes.
+    pub fn forecast(settings: &RenderSettings) -> u64 {
+        let alpha = settings.background == Background::Transparent;
+        let pixels = Tile::rendered(settings).area() as u64;
+        pixels.saturating_mul(Sums::bytes_each(&settings.layers, alpha))
     }
 
     /// Width and height of the picture in pixels.
@@ -186,7 +196,7 @@ impl Film {
             "{tile:?} reaches beyond a film of {:?}",
             self.size
         );
-        let sums = Sums::new(tile.area(), &self.layers, self.alpha).expect("memory for one tile");
+        let sums = Sums::new(tile.area(), &self.layers, self.alpha);
         TileBuffer { tile, layer_filter: self.layer_filter, sums, non_finite: 0 }
     }
 
@@ -320,33 +330,47 @@ fn is_finite(seen: &Seen) -> bool {
 }
 
 /// `count` copies of the default, or none where they are not wanted.
-fn filled<T: Clone + Default>(wanted: bool, count: usize) -> Result<Vec<T>, TryReserveError> {
-    let mut values = Vec::new();
-    if wanted {
-        values.try_reserve_exact(count)?;
-        values.resize(count, T::default());
-    }
-    Ok(values)
+fn filled<T: Clone + Default>(wanted: bool, count: usize) -> Vec<T> {
+    vec![T::default(); if wanted { count } else { 0 }]
 }
 
 impl Sums {
-    fn new(pixels: usize, layers: &[Layer], alpha: bool) -> Result<Self, TryReserveError> {
+    fn new(pixels: usize, layers: &[Layer], alpha: bool) -> Self {
         let wants = |layer| layers.contains(&layer);
-        Ok(Self {
-            count: filled(true, pixels)?,
-            mean: filled(true, pixels)?,
-            transmittance: filled(alpha, pixels)?,
-            m2: filled(wants(Layer::Variance), pixels)?,
-            lit_hits: filled(wants(Layer::Albedo), pixels)?,
-            hits: filled(layers.iter().any(|layer| layer.is_geometry()), pixels)?,
-            albedo: filled(wants(Layer::Albedo), pixels)?,
-            normal: filled(wants(Layer::Normal), pixels)?,
-            depth: filled(wants(Layer::Depth), pixels)?,
-            position: filled(wants(Layer::Position), pixels)?,
-            followed: filled(wants(Layer::Motion), pixels)?,
-            motion: filled(wants(Layer::Motion), pixels)?,
-            object: filled(wants(Layer::ObjectId), pixels)?,
-        })
+        Self {
+            count: filled(true, pixels),
+            mean: filled(true, pixels),
+            transmittance: filled(alpha, pixels),
+            m2: filled(wants(Layer::Variance), pixels),
+            lit_hits: filled(wants(Layer::Albedo), pixels),
+            hits: filled(layers.iter().any(|layer| layer.is_geometry()), pixels),
+            albedo: filled(wants(Layer::Albedo), pixels),
+            normal: filled(wants(Layer::Normal), pixels),
+            depth: filled(wants(Layer::Depth), pixels),
+            position: filled(wants(Layer::Position), pixels),
+            followed: filled(wants(Layer::Motion), pixels),
+            motion: filled(wants(Layer::Motion), pixels),
+            object: filled(wants(Layer::ObjectId), pixels),
+        }
+    }
+
+    /// Bytes of one pixel: of a film of one.
+    fn bytes_each(layers: &[Layer], alpha: bool) -> u64 {
+        let one = Self::new(1, layers, alpha);
+        let bytes = size_of_val(&one.count[..])
+            + size_of_val(&one.mean[..])
+            + size_of_val(&one.transmittance[..])
+            + size_of_val(&one.m2[..])
+            + size_of_val(&one.lit_hits[..])
+            + size_of_val(&one.hits[..])
+            + size_of_val(&one.albedo[..])
+            + size_of_val(&one.normal[..])
+            + size_of_val(&one.depth[..])
+            + size_of_val(&one.position[..])
+            + size_of_val(&one.followed[..])
+            + size_of_val(&one.motion[..])
+            + size_of_val(&one.object[..]);
+        bytes as u64
     }
 
     fn push(&mut self, i: usize, radiance: Rgb) {

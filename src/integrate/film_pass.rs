@@ -2,13 +2,15 @@
 
 use super::layers::fill_centres;
 use super::photon_passes::PhotonReport;
+use super::radius::PixelRadius;
 use super::scene_view::{SceneTables, SceneView};
 use super::{PathCounters, PathTracer};
 use crate::description::{RenderSettings, TextureFiltering};
-use crate::extract::{CameraRay, Feature, FrameOrigin, Requirements};
+use crate::extract::{CameraRay, Feature, FrameOrigin, Method, Requirements};
 use crate::film::{Film, FilmError, FilterSampler, Tile, TileBuffer};
 use crate::frame::RenderControl;
 use crate::math::Cone;
+use crate::memory::ask;
 use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::{Clear, Inside, OneSolid, SolidStack, Whole};
 use crate::world::{FrameClock, Settings};
@@ -39,13 +41,29 @@ impl IntegrateStatus {
         &mut self,
         settings: &RenderSettings,
         control: &RenderControl,
+        method: Method,
     ) -> Option<Film> {
         *self = Self::default();
         if control.cancel.load(Relaxed) {
             return None;
         }
-        Film::for_settings(settings).map_err(|error| self.error = Some(error)).ok()
+        let (width, height) = Tile::rendered(settings).size();
+        let film = ask(film_memory(settings, method))
+            .map_err(|source| FilmError::Memory { width, height, source })
+            .and_then(|()| Film::for_settings(settings));
+        film.map_err(|error| self.error = Some(error)).ok()
     }
+}
+
+/// Bytes of the film of a frame. A method with photons goes over it pass by pass, so that all tiles have their sums and
+/// radii at once beside it.
+pub fn film_memory(settings: &RenderSettings, method: Method) -> u64 {
+    let film = Film::forecast(settings);
+    if !method.has_photons() {
+        return film;
+    }
+    let pixels = Tile::rendered(settings).area() as u64;
+    2 * film + pixels * size_of::<PixelRadius>() as u64
 }
 
 /// Everything but the scene that decides the samples of a tile.
@@ -94,7 +112,7 @@ pub fn render_film(
     mut status: ResMut<IntegrateStatus>,
 ) {
     let settings = &settings.0;
-    let Some(mut film) = status.begin(settings, &control) else { return };
+    let Some(mut film) = status.begin(settings, &control, Method::Path) else { return };
     let scene = tables.view();
     let requires = |feature| scene.requirements.has(feature);
     let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);

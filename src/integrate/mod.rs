@@ -13,6 +13,7 @@ mod share;
 mod uneven;
 mod vertex;
 
+pub use film_pass::film_memory;
 pub use film_pass::{IntegrateStatus, render_film};
 pub use path::{PathCounters, PathTracer};
 pub use photon_passes::{PhotonReport, PhotonScratch, render_film_with_photons};

@@ -25,8 +25,9 @@ use crate::build::photon::{
 use crate::color::spectrum::SETS;
 use crate::description::DirectLight;
 use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
-use crate::film::{Film, Tile, TileBuffer};
+use crate::film::{Film, FilmError, Tile, TileBuffer};
 use crate::frame::RenderControl;
+use crate::memory::{Shortage, ask};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::{Clear, Inside, NestingFaults, OneSolid, SolidStack, Whole};
 use crate::world::{FrameClock, Settings};
@@ -56,6 +57,15 @@ pub struct PhotonScratch {
     volume: VolumeMap,
     volume_caustics: VolumeMap,
     faults: NestingFaults,
+}
+
+impl PhotonScratch {
+    /// Bytes of photons and maps.
+    fn memory(&self) -> u64 {
+        let maps = self.global.memory() + self.caustics.memory() + self.irradiance.memory();
+        let volumes = self.volume.memory() + self.volume_caustics.memory();
+        (self.store.memory() + maps + volumes) as u64
+    }
 }
 
 /// What the photons of a frame came to.
@@ -132,7 +142,7 @@ pub fn render_film_with_photons(
     mut status: ResMut<IntegrateStatus>,
 ) {
     let settings = &settings.0;
-    let Some(mut film) = status.begin(settings, &control) else { return };
+    let Some(mut film) = status.begin(settings, &control, chosen.method) else { return };
     let scene = tables.view();
     let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);
     let begin = Begin { scene, settings, origin: &origin, seen: film.wants_seen() };
@@ -153,6 +163,13 @@ pub fn render_film_with_photons(
             setting.fill(film_mut, begin.tracer::<true, SolidStack>(), scratch)
         }
         (false, Around::Whole) => setting.fill(film_mut, begin.tracer::<true, Whole>(), scratch),
+    };
+    let done = match done {
+        Ok(done) => done,
+        Err(shortage) => {
+            status.error = Some(FilmError::Photons(shortage));
+            None
+        }
     };
     if let Some((counters, report)) = done {
         status.film = Some(film);
@@ -363,10 +380,7 @@ impl<'a> Setting<'a> {
             })?;
             report.caustics = report.caustics.max(caustics.len() as u64);
         }
-        let volumes = volume.memory() + volume_caustics.memory();
-        let memory =
-            store.memory() + global.memory() + caustics.memory() + irradiance.memory() + volumes;
-        report.memory_bytes = report.memory_bytes.max(memory as u64);
+        report.memory_bytes = report.memory_bytes.max(scratch.memory());
         Some(())
     }
 
@@ -388,11 +402,24 @@ impl<'a> Setting<'a> {
         film: &mut Film,
         path: PathTracer<'a, O, I>,
         scratch: &mut PhotonScratch,
-    ) -> Option<(PathCounters, PhotonReport)> {
+    ) -> Result<Option<(PathCounters, PhotonReport)>, Shortage> {
         scratch.faults = NestingFaults::default();
         let centres = fill_centres(film, &path);
         self.job.control.rays.fetch_add(centres, Relaxed);
-        let mut report = self.plan::<O, I>(scratch);
+        let report = self.plan::<O, I>(scratch);
+        // What is held from the frame before is used again.
+        ask(report.forecast_bytes.saturating_sub(scratch.memory()))?;
+        Ok(self.passes(film, path, scratch, report))
+    }
+
+    /// The passes of a frame; `None` when the control cancelled them.
+    fn passes<const O: bool, I: Inside>(
+        &self,
+        film: &mut Film,
+        path: PathTracer<'a, O, I>,
+        scratch: &mut PhotonScratch,
+        mut report: PhotonReport,
+    ) -> Option<(PathCounters, PhotonReport)> {
         let mut tiles: Vec<TileState> =
             film.tiles().into_iter().map(|tile| TileState::new(film, tile)).collect();
         let samples = self.job.settings.samples;

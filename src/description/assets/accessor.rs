@@ -6,6 +6,7 @@
 //! comes from the file, so each is checked against the bytes that are there.
 
 use super::MAX_MESH_ELEMENTS;
+use crate::memory::ask;
 use gltf::json::Root;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
@@ -80,6 +81,9 @@ impl Source<'_> {
         let Checked::Valid(kind) = &accessor.type_ else { unreachable!("checked by the caller") };
         let component = component(accessor, index)?;
         let count = length(accessor.count.0, index)?;
+        // What is read, and its copy in the mesh.
+        let bytes = 2 * (count * size_of::<T>()) as u64;
+        ask(bytes).map_err(|shortage| format!("accessor {index}, {count} elements: {shortage}"))?;
         let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
         let multiplicity = kind.multiplicity();
         let mut values = match accessor.buffer_view {

@@ -3,10 +3,15 @@
 use super::MAX_MESH_ELEMENTS;
 use super::accessor::Source;
 use crate::description::{Rgb, TriangleMesh};
+use crate::memory::ask;
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 use gltf::json::Index;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
+
+/// Place, normal, coordinates, tangent and colour, and three indices.
+const VERTEX_BYTES: usize = 60;
+const TRIANGLE_BYTES: usize = 12;
 
 /// The mesh so far.
 #[derive(Default)]
@@ -45,9 +50,11 @@ impl Gathered {
             Some(colors) => Some(source.colors(colors)?).filter(|colors| colors.len() == count),
             None => None,
         };
-        let indices = match primitive.indices {
-            Some(indices) => source.indices(indices.value())?,
-            None => (0..count as u32).collect(),
+        let indices = if let Some(indices) = primitive.indices {
+            source.indices(indices.value())?
+        } else {
+            ask(4 * count as u64).map_err(|shortage| format!("its indices: {shortage}"))?;
+            (0..count as u32).collect()
         };
         if let Some(index) = indices.iter().find(|&&index| index as usize >= count) {
             return Err(format!("index {index} is beyond its {count} vertices"));
@@ -60,6 +67,10 @@ impl Gathered {
                 "the asset has more than {MAX_MESH_ELEMENTS} vertices or triangles"
             ));
         }
+        // All of it grows at once, and while a list grows its old place is still there.
+        let bytes =
+            2 * (self.mesh.memory() + count * VERTEX_BYTES + indices.len() * TRIANGLE_BYTES);
+        ask(bytes as u64).map_err(|shortage| format!("its mesh: {shortage}"))?;
         self.any_uv |= uvs.is_some();
         self.any_normal |= normals.is_some();
         self.any_color |= colors.is_some();

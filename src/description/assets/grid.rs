@@ -11,7 +11,7 @@
 //! 48–     values: channels next to each other, then x, then y, then z
 //! ```
 
-use super::{AssetError, read_file, too_large};
+use super::{AssetError, ask_for, read_file, too_large};
 use crate::description::GridData;
 use glam::Vec3;
 use std::path::Path;
@@ -76,6 +76,7 @@ fn parse(bytes: &[u8], path: &Path) -> Result<GridData, AssetError> {
             "it is cut off: its values take {found} bytes, expected {expected}"
         )));
     }
+    ask_for(path, 4 * count as u64)?;
     let values: Vec<f32> = if width == 1 {
         values[..count].iter().map(|&code| f32::from(code) / 255.0).collect()
     } else {

@@ -1,11 +1,12 @@
 //! Images: PNG, JPEG, Radiance HDR and OpenEXR to [`ImageData`].
 
-use super::{AssetError, MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, read_file, too_large};
+use super::{AssetError, MAX_IMAGE_BYTES, MAX_IMAGE_SIDE, ask_for, read_file, too_large};
 use crate::description::{Encoding, ImageData, ImagePixels};
 use exr::meta::attribute::Text;
 use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -60,7 +61,8 @@ fn check_numbers(image: &ImageData, path: &Path) -> Result<(), AssetError> {
 /// Decodes everything but OpenEXR.
 fn decode(bytes: &[u8], encoding: Encoding, path: &Path) -> Result<ImageData, AssetError> {
     let failed = |cause| AssetError::Image { path: path.to_owned(), cause };
-    let mut reader = ImageReader::new(Cursor::new(bytes))
+    let bytes = without_packed_texts(bytes);
+    let mut reader = ImageReader::new(Cursor::new(&bytes[..]))
         .with_guessed_format()
         .map_err(|cause| AssetError::Read { path: path.to_owned(), cause })?;
     if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Hdr)) {
@@ -82,6 +84,30 @@ fn decode(bytes: &[u8], encoding: Encoding, path: &Path) -> Result<ImageData, As
     image.apply_orientation(orientation);
     let (width, height) = (image.width(), image.height());
     Ok(ImageData { width, height, pixels: pixels(image, encoding) })
+}
+
+/// A PNG without what is packed in it beside the pixels: a colour profile and texts, which are not read. A few
+/// kilobytes of them can unpack to gigabytes.
+fn without_packed_texts(bytes: &[u8]) -> Cow<'_, [u8]> {
+    const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+    let (mut kept, mut at) = (Vec::new(), SIGNATURE.len());
+    if !bytes.starts_with(SIGNATURE) {
+        return Cow::Borrowed(bytes);
+    }
+    // Each chunk: its length, its kind, as many bytes, a checksum (PNG specification, section 5.3).
+    while let Some(head) = bytes.get(at..at + 8) {
+        let length = u32::from_be_bytes([head[0], head[1], head[2], head[3]]) as usize;
+        let end = at.saturating_add(length).saturating_add(12).min(bytes.len());
+        if matches!(&head[4..], b"iCCP" | b"zTXt" | b"iTXt") {
+            if kept.is_empty() {
+                kept.extend_from_slice(&bytes[..at]);
+            }
+        } else if !kept.is_empty() {
+            kept.extend_from_slice(&bytes[at..end]);
+        }
+        at = end;
+    }
+    if kept.is_empty() { Cow::Borrowed(bytes) } else { Cow::Owned(kept) }
 }
 
 /// The pixels in the smallest storage that keeps their precision.
@@ -127,7 +153,8 @@ fn check_size(width: u64, height: u64, path: &Path) -> Result<(), AssetError> {
         let limit = format!("{side} pixels on a side and {MAX_IMAGE_BYTES} bytes decoded");
         return Err(too_large(path, format!("{width} × {height} pixels"), limit));
     }
-    Ok(())
+    // At most four numbers of 32 bits of a pixel, and what the decoder holds of it meanwhile.
+    ask_for(path, 2 * bytes)
 }
 
 fn read_exr(bytes: &[u8], path: &Path) -> Result<ImageData, AssetError> {
@@ -212,7 +239,7 @@ fn of_floats(size: exr::math::Vec2<usize>, pixels: (usize, Vec<[f32; 4]>)) -> Im
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::{ImageBuffer, Rgb, Rgba};
+    use image::{ExtendedColorType, ImageBuffer, ImageEncoder, Rgb, Rgba};
     use std::path::PathBuf;
     use tempfile::TempDir;
 
@@ -221,6 +248,24 @@ mod tests {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         (folder, path)
+    }
+
+    /// Oracle: the same picture without the profile, and that the profile is gone. A profile that unpacks to gigabytes is
+    /// not unpacked.
+    #[test]
+    fn packed_profiles_are_left_out_unread() {
+        let mut bytes = Vec::new();
+        let mut encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+        encoder.set_icc_profile(vec![7; 1 << 20]).expect("PNG has profiles");
+        encoder.write_image(&[10, 20, 30], 1, 1, ExtendedColorType::Rgb8).expect("it is small");
+        let find = |bytes: &[u8]| bytes.windows(4).any(|kind| kind == b"iCCP");
+        assert!(find(&bytes) && !find(&without_packed_texts(&bytes)));
+        let image = parse(&bytes, Encoding::Srgb, Path::new("a.png")).expect("it is sound");
+        assert_eq!(image.pixels, ImagePixels::Rgba8(vec![[10, 20, 30, 255]], Encoding::Srgb));
+        // Cut off anywhere it is an error, and never a panic.
+        for end in 0..bytes.len().min(200) {
+            assert!(parse(&bytes[..end], Encoding::Srgb, Path::new("a.png")).is_err());
+        }
     }
 
     fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {

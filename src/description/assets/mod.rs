@@ -23,6 +23,7 @@ pub use grid::{MAX_GRID_VALUES, load_grid};
 pub use image::load_image;
 
 use super::TriangleMesh;
+use crate::memory::{self, Shortage};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -89,6 +90,8 @@ pub enum AssetError {
     Obj { path: PathBuf, line: usize, message: String },
     #[error("`{path}`: {message}", path = .path.display())]
     Mesh { path: PathBuf, message: String },
+    #[error("`{path}` is too large for this machine: {cause}", path = .path.display())]
+    Memory { path: PathBuf, cause: Shortage },
     #[error(
         "`{path}` names the buffer `{uri}`, which is not a file beside it: \
          use a relative path without `..`, or embed the buffer",
@@ -151,22 +154,28 @@ fn mesh_format(path: &Path) -> Result<MeshFormat, AssetError> {
 /// Reads a whole file of at most [`MAX_FILE_BYTES`].
 fn read_file(path: &Path) -> Result<Vec<u8>, AssetError> {
     let failed = |cause| AssetError::Read { path: path.to_owned(), cause };
-    let file = File::open(path).map_err(failed)?;
-    let metadata = file.metadata().map_err(failed)?;
-    // Opening a folder succeeds on some systems; reading it would fail with a stranger message.
-    if metadata.is_dir() {
-        return Err(failed(io::ErrorKind::IsADirectory.into()));
+    // Asked before it is opened: opening a pipe waits for somebody to write into it, and a device may never end.
+    let metadata = path.metadata().map_err(failed)?;
+    if !metadata.is_file() {
+        return Err(failed(io::Error::other("it is not a regular file")));
     }
+    ask_for(path, metadata.len())?;
+    let file = File::open(path).map_err(failed)?;
     if metadata.len() > MAX_FILE_BYTES {
         return Err(too_large(path, format!("{} bytes", metadata.len()), MAX_FILE_BYTES));
     }
     let mut bytes = Vec::new();
-    // A device or a pipe reports no length, and a file may grow: the reader is limited as well.
+    // A file may grow meanwhile: the reader is limited as well.
     file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(too_large(path, "more bytes than it said".to_owned(), MAX_FILE_BYTES));
     }
     Ok(bytes)
+}
+
+/// Whether there is memory for so many bytes, before they are taken.
+fn ask_for(path: &Path, bytes: u64) -> Result<(), AssetError> {
+    memory::ask(bytes).map_err(|cause| AssetError::Memory { path: path.to_owned(), cause })
 }
 
 fn too_large(path: &Path, found: String, limit: impl ToString) -> AssetError {
@@ -191,6 +200,34 @@ mod tests {
     #[test]
     fn a_folder_is_not_a_file() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(matches!(read_file(folder.path()), Err(AssetError::Read { .. })));
+        let error = read_file(folder.path()).expect_err("it is none").to_string();
+        assert!(error.contains("not a regular file"), "{error}");
+    }
+
+    /// The program would wait for ever for somebody to write into a pipe.
+    #[cfg(unix)]
+    #[test]
+    fn pipes_and_devices_are_refused_without_waiting() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe.bin");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.expect("mkfifo is there").success());
+        let scene = folder.path().join("m.gltf");
+        std::fs::write(
+            &scene,
+            r#"{"asset": {"version": "2.0"}, "buffers": [{"byteLength": 9, "uri": "pipe.bin"}]}"#,
+        )
+        .unwrap();
+        let errors = [
+            read_file(&pipe).map(drop),
+            read_file(Path::new("/dev/zero")).map(drop),
+            load_mesh(&scene, &mut Vec::new()).map(drop),
+            load_image(&pipe, Encoding::Srgb).map(drop),
+            load_grid(&pipe).map(drop),
+        ];
+        for error in errors {
+            let error = error.expect_err("it is no file").to_string();
+            assert!(error.contains("not a regular file"), "{error}");
+        }
     }
 }
