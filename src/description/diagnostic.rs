@@ -173,42 +173,76 @@ impl fmt::Display for Diagnostics {
 impl std::error::Error for Diagnostic {}
 impl std::error::Error for Diagnostics {}
 
-/// The candidate which was probably meant by `found`, if one is near.
+/// Finds the names which were probably meant, as long as that takes no time worth naming.
 ///
-/// Near means a Damerau–Levenshtein distance (letters added, left out, changed or swapped; case
-/// ignored) of at most a third of the longer word's length.
-pub(super) fn nearest<'a>(
-    found: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
-    let lower = found.to_lowercase();
-    candidates
-        .into_iter()
-        .map(|candidate| {
-            (strsim::damerau_levenshtein(&lower, &candidate.to_lowercase()), candidate)
-        })
-        .filter(|(distance, candidate)| {
-            *distance <= found.chars().count().max(candidate.chars().count()).div_ceil(3)
-        })
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, candidate)| candidate)
+/// A distance takes as many steps as the product of the lengths, and each wrong name is held against all right ones:
+/// thousands of long names would take minutes. When all steps are spent, mistakes are told without a hint.
+#[derive(Clone, Debug)]
+pub(super) struct Hints {
+    steps_left: usize,
 }
 
-/// "did you mean …?", else the list of what there is, else nothing.
-pub(super) fn suggestion<'a>(
-    found: &str,
-    candidates: impl IntoIterator<Item = &'a str> + Clone,
-    what: &str,
-) -> Option<String> {
-    if let Some(name) = nearest(found, candidates.clone()) {
-        return Some(format!("did you mean `{name}`?"));
+impl Default for Hints {
+    /// Sixty wrong names of 13 letters among two thousand right ones; a fifth of a second.
+    fn default() -> Self {
+        Self { steps_left: 20_000_000 }
     }
-    let mut names: Vec<String> =
-        candidates.into_iter().take(21).map(|name| format!("`{name}`")).collect();
-    if names.len() > 20 {
-        "…".clone_into(&mut names[20]);
+}
+
+impl Hints {
+    /// The candidate which was probably meant by `found`, if one is near.
+    ///
+    /// Near means a Damerau–Levenshtein distance (letters added, left out, changed or swapped; case
+    /// ignored) of at most a third of the longer word's length.
+    pub(super) fn nearest<'a>(
+        &mut self,
+        found: &str,
+        candidates: impl IntoIterator<Item = &'a str>,
+    ) -> Option<&'a str> {
+        let lower = found.to_lowercase();
+        let length = lower.chars().count();
+        let mut best: Option<(usize, &str)> = None;
+        for candidate in candidates {
+            let other = candidate.chars().count();
+            let allowed = length.max(other).div_ceil(3);
+            // Every letter that one has more is a difference.
+            let steps = if length.abs_diff(other) > allowed { 1 } else { 1 + length * other };
+            let Some(left) = self.steps_left.checked_sub(steps) else {
+                self.steps_left = 0;
+                return None;
+            };
+            self.steps_left = left;
+            if steps == 1 {
+                continue;
+            }
+            let distance = strsim::damerau_levenshtein(&lower, &candidate.to_lowercase());
+            if distance <= allowed && best.is_none_or(|(least, _)| distance < least) {
+                best = Some((distance, candidate));
+            }
+        }
+        best.map(|(_, candidate)| candidate)
     }
-    (!names.is_empty()).then(|| format!("{what}: {}", names.join(", ")))
+
+    /// "did you mean …?", else the list of what there is, else nothing.
+    pub(super) fn suggestion<'a>(
+        &mut self,
+        found: &str,
+        candidates: impl IntoIterator<Item = &'a str> + Clone,
+        what: &str,
+    ) -> Option<String> {
+        if let Some(name) = self.nearest(found, candidates.clone()) {
+            return Some(format!("did you mean `{name}`?"));
+        }
+        if self.steps_left == 0 {
+            return None;
+        }
+        let mut names: Vec<String> =
+            candidates.into_iter().take(21).map(|name| format!("`{name}`")).collect();
+        if names.len() > 20 {
+            "…".clone_into(&mut names[20]);
+        }
+        (!names.is_empty()).then(|| format!("{what}: {}", names.join(", ")))
+    }
 }
 
 #[cfg(test)]
@@ -218,9 +252,29 @@ mod tests {
     #[test]
     fn the_nearest_name_is_found_and_far_ones_are_not() {
         let names = ["radius", "height", "capped"];
-        assert_eq!(nearest("raduis", names), Some("radius"));
-        assert_eq!(nearest("Height", names), Some("height"));
-        assert_eq!(nearest("albedo", names), None);
+        let nearest = |found| Hints::default().nearest(found, names);
+        assert_eq!(nearest("raduis"), Some("radius"));
+        assert_eq!(nearest("Height"), Some("height"));
+        assert_eq!(nearest("albedo"), None);
+        assert_eq!(nearest(&"radius".repeat(100_000)), None);
+    }
+
+    /// Two thousand wrong names among two thousand right ones: the first are told what was meant, then the steps are spent.
+    #[test]
+    fn hints_end_before_they_take_long() {
+        let names: Vec<String> = (0..2000).map(|k| format!("material{k:04}")).collect();
+        let mut hints = Hints::default();
+        let mut told = 0;
+        for name in &names {
+            let hint = hints.suggestion(
+                &format!("{name}x"),
+                names.iter().map(String::as_str),
+                "materials",
+            );
+            told += usize::from(hint == Some(format!("did you mean `{name}`?")));
+        }
+        assert!((50..200).contains(&told), "{told}");
+        assert_eq!(hints.suggestion("sky", ["sky"], "lights"), None, "all steps are spent");
     }
 
     #[test]

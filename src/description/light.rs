@@ -36,15 +36,16 @@ pub enum Light<R> {
     /// A point which shines evenly in all directions. Exactly one of the two strengths.
     Point {
         /// Intensity in W·sr⁻¹ per channel.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "super::value::some_color")]
         intensity: Option<Rgb>,
         /// Flux in watts per channel: `4π` times the intensity.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "super::value::some_color")]
         power: Option<Rgb>,
     },
     /// A point which shines into a cone.
     Spot {
         /// Intensity on the axis in W·sr⁻¹ per channel.
+        #[serde(deserialize_with = "super::value::color")]
         intensity: Rgb,
         /// Half angle of the cone in degrees; no light outside.
         #[serde(default = "spot_angle")]
@@ -56,6 +57,7 @@ pub enum Light<R> {
     /// Parallel light from infinitely far away, such as the sun.
     Directional {
         /// Irradiance of a plane which faces it, W·m⁻² per channel.
+        #[serde(deserialize_with = "super::value::color")]
         irradiance: Rgb,
         /// Angular **diameter** in degrees; 0 is perfectly parallel. The sun has 0.53.
         #[serde(default)]

@@ -50,7 +50,7 @@ pub enum Material<R> {
         #[serde(default)]
         scattering: Option<Scattering>,
         /// What the inside emits per metre, W·m⁻³·sr⁻¹.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "super::value::color")]
         emission: Rgb,
         /// How much of the medium is where: a factor on attenuation, scattering and emission.
         #[serde(default = "one_scalar")]
@@ -78,10 +78,10 @@ pub enum Material<R> {
         #[serde(default)]
         f0: Option<Value<Rgb, R>>,
         /// Real part of the index of refraction per channel.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "super::value::some_color")]
         eta: Option<Rgb>,
         /// Imaginary part of the index of refraction per channel.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "super::value::some_color")]
         k: Option<Rgb>,
         /// Perceptual roughness.
         #[serde(default = "smooth")]
@@ -175,6 +175,7 @@ pub enum Green {
 #[serde(deny_unknown_fields)]
 pub struct Attenuation {
     /// Transmittance per channel after `distance`, in `(0, 1]`.
+    #[serde(deserialize_with = "super::value::color")]
     pub color: Rgb,
     /// Metres.
     #[serde(default = "one_metre")]
@@ -193,6 +194,7 @@ impl Attenuation {
 #[serde(deny_unknown_fields)]
 pub struct Scattering {
     /// Scattering coefficient per metre and channel.
+    #[serde(deserialize_with = "super::value::color")]
     pub coefficient: Rgb,
     /// Into which directions.
     #[serde(default)]

@@ -83,6 +83,36 @@ impl<'de> Deserialize<'de> for Value<Rgb, String> {
     }
 }
 
+/// Reads a colour which no texture can give: a number is a grey, here as everywhere.
+///
+/// # Errors
+/// When it is neither a number nor three of them.
+pub(super) fn color<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Rgb, D::Error> {
+    match Value::<Rgb, String>::deserialize(deserializer)? {
+        Value::Constant(color) => Ok(color),
+        Value::Texture(name) => Err(de::Error::invalid_type(
+            de::Unexpected::Str(&name),
+            &"a number or a colour (r, g, b): no texture is possible here",
+        )),
+    }
+}
+
+/// [`color`] where it may be left out.
+///
+/// # Errors
+/// As for it.
+pub(super) fn some_color<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<Rgb>, D::Error> {
+    struct Color(Rgb);
+    impl<'de> Deserialize<'de> for Color {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            color(deserializer).map(Self)
+        }
+    }
+    Ok(Option::<Color>::deserialize(deserializer)?.map(|color| color.0))
+}
+
 impl<'de> Deserialize<'de> for Value<f32, String> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct ScalarVisitor;

@@ -3,10 +3,12 @@
 use super::spawn_order;
 use crate::color::spectrum::WavelengthSet;
 use crate::description::{GridData, ImageData, Rgb, Value};
-use crate::shade::{MaterialTable, TextureNeeds, Textures, cycle, material_cycle};
+use crate::math::{GraphFault, MAX_PARTS_DEPTH, parts_first};
+use crate::shade::{MaterialTable, TextureNeeds, Textures, material_order};
 use crate::world::{FrameClock, Material, Settings, Texture};
 use bevy_ecs::entity::EntityHashMap;
 use bevy_ecs::prelude::*;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// What surfaces are made of, by index.
@@ -69,7 +71,11 @@ fn needs_of(
     let mut needs: Vec<Option<TextureNeeds>> = vec![None; materials.len()];
     for (index, need) in needs.iter_mut().enumerate() {
         let mut open = vec![index as u32];
+        let mut seen = HashSet::new();
         while let Some(part) = open.pop() {
+            if !seen.insert(part) {
+                continue;
+            }
             let mut texture = |texture: u32| {
                 *need = Some(need.unwrap_or_default().and(textures.needs(texture)));
                 Ok::<_, std::convert::Infallible>(())
@@ -98,10 +104,20 @@ const BLACK_TEXTURE: IndexedTexture = crate::description::Texture::Gradient {
     b: Value::Constant(Rgb::ZERO),
 };
 
-/// A texture which refers to itself, if there is one.
-fn texture_cycle(textures: &[IndexedTexture]) -> Option<u32> {
+/// An order in which each texture comes after those that it refers to.
+fn texture_order(textures: &[IndexedTexture]) -> Result<Vec<u32>, GraphFault> {
     let parts = |index: u32| textures[index as usize].refs().map(|(_, part)| *part).collect();
-    cycle(textures.len() as u32, parts)
+    parts_first(textures.len() as u32, parts)
+}
+
+/// The node at fault and what is wrong with it, in words.
+fn fault_of(fault: GraphFault) -> (u32, String) {
+    match fault {
+        GraphFault::Cycle(node) => (node, "is made of itself".to_owned()),
+        GraphFault::TooDeep(node) => {
+            (node, format!("is made of more than {MAX_PARTS_DEPTH} in a row"))
+        }
+    }
 }
 
 /// Which entity became which index in [`Surfaces`].
@@ -160,11 +176,12 @@ pub fn extract_surfaces(
         .collect();
     table.sort_unstable_by_key(|(slot, _)| *slot);
     let mut table: Vec<_> = table.into_iter().map(|(_, material)| material).collect();
-    while let Some(looped) = material_cycle(&table) {
-        let entity = materials.iter().map(|(e, _)| e).find(|e| material_slots[e] == looped);
+    while let Err(fault) = material_order(&table) {
+        let (slot, what) = fault_of(fault);
+        let entity = materials.iter().map(|(e, _)| e).find(|e| material_slots[e] == slot);
         let name = entity.map_or_else(String::new, |e| format!(" of {e}"));
-        dangling.push(format!("the material{name} is mixed of itself"));
-        table[looped as usize] = BLACK;
+        dangling.push(format!("the material{name} {what}"));
+        table[slot as usize] = BLACK;
     }
     let mut list: Vec<(u32, IndexedTexture)> = Vec::with_capacity(textures.iter().len());
     for (entity, texture) in &textures {
@@ -178,11 +195,12 @@ pub fn extract_surfaces(
     }
     list.sort_unstable_by_key(|(slot, _)| *slot);
     let mut list: Vec<IndexedTexture> = list.into_iter().map(|(_, texture)| texture).collect();
-    while let Some(looped) = texture_cycle(&list) {
-        let entity = textures.iter().map(|(e, _)| e).find(|e| texture_slots[e] == looped);
+    while let Err(fault) = texture_order(&list) {
+        let (slot, what) = fault_of(fault);
+        let entity = textures.iter().map(|(e, _)| e).find(|e| texture_slots[e] == slot);
         let name = entity.map_or_else(String::new, |e| format!(" of {e}"));
-        dangling.push(format!("the texture{name} is made of itself"));
-        list[looped as usize] = BLACK_TEXTURE;
+        dangling.push(format!("the texture{name} {what}"));
+        list[slot as usize] = BLACK_TEXTURE;
     }
     let textures = Textures::new(list, filtering, &pyramids).at_time(shutter);
     *surfaces = Surfaces { dangling, ..Surfaces::new(table, textures) };

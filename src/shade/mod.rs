@@ -23,7 +23,7 @@ pub use bsdf::{
     RoughPlastic, SmoothConductor, SmoothDielectric, SmoothPlastic, ThinGlass, TransportMode,
 };
 pub use material::{
-    CausticLobe, Chosen, Interior, MaterialTable, Surroundings, bent_normal, cycle, material_cycle,
+    CausticLobe, Chosen, Interior, MaterialTable, Surroundings, bent_normal, material_order,
 };
 pub use shading_normal::{InnerReflections, ShadedBsdf};
 pub use texture::{Moments, Pyramids, RenderTexture, TextureNeeds, TexturePoint, Textures};

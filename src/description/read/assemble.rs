@@ -12,9 +12,9 @@ use super::source::{Cursor, Source};
 use super::surface::{self, MeshFile};
 use super::texture::read_texture;
 use super::waves::check_waves;
-use super::{ContentHash, LoadOptions, Names, entity, relations};
+use super::{ContentHash, LoadOptions, Names, entity, relations, words};
 use crate::description::assets::{MAX_FILE_BYTES, load_grid, load_image, load_mesh};
-use crate::description::diagnostic::{Diagnostic, Diagnostics, SourceText, suggestion};
+use crate::description::diagnostic::{Diagnostic, Diagnostics, SourceText};
 use crate::description::modelling::{grid, subdivided};
 use crate::description::{
     Clock, Displacement, Encoding, Filter, GridData, ImageData, PhotonSettings, RenderSettings,
@@ -95,10 +95,13 @@ pub(super) fn assemble(
             scene.textures.insert(name.clone(), texture);
         }
     }
-    relations::check_mesh_cycles(names, report);
+    // A mesh is made from others by recursion, which ends only where they have an order.
+    let ordered = relations::check_mesh_parts(names, report);
     let mut made = HashSet::new();
-    for name in names.meshes.keys() {
-        assets.named_mesh(name, names, &mut made, &mut scene, report);
+    for (name, mesh) in &names.meshes {
+        if ordered || mesh.field("of").is_none() {
+            assets.named_mesh(name, names, &mut made, &mut scene, report);
+        }
     }
     // In the order of the file, whatever was made from what.
     scene.meshes.sort_by_key(|name, _| names.meshes.get_index_of(name));
@@ -209,8 +212,10 @@ fn gather<'a>(root: &Cursor<'a>, definitions: &mut Definitions<'a>, report: &mut
             "entities" => gather_names(&part, &mut names.entities, report),
             other => {
                 let message = format!("a scene has no field `{other}`");
+                let help = words::hint(other, &FIELDS)
+                    .or_else(|| report.hints.suggestion(other, FIELDS, "fields"));
                 report.error("scene::unknown-field", part.key_place(), &part.path, message).help =
-                    suggestion(other, FIELDS, "fields");
+                    help;
             }
         }
     }
@@ -387,15 +392,16 @@ impl Assets<'_> {
         report: &mut Report,
     ) -> Option<PathBuf> {
         let dir = place.source.dir.as_deref();
-        let found = files::find(name, dir, self.options, MAX_FILE_BYTES).and_then(|path| {
-            if !scene.files.contains(&path) {
-                self.hash_file(name, &path).map_err(|source| files::FileError::Unreadable {
-                    name: name.to_owned(),
-                    source,
-                })?;
-            }
-            Ok(path)
-        });
+        let found = files::find(name, dir, self.options, MAX_FILE_BYTES, &mut report.hints)
+            .and_then(|path| {
+                if !scene.files.contains(&path) {
+                    self.hash_file(name, &path).map_err(|source| files::FileError::Unreadable {
+                        name: name.to_owned(),
+                        source,
+                    })?;
+                }
+                Ok(path)
+            });
         match found {
             Ok(path) => {
                 if !scene.files.contains(&path) {

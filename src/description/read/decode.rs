@@ -3,9 +3,11 @@
 //! `ron` stops at the first mistake. A struct which cannot be decoded is therefore decoded once
 //! more field by field, each alone in parentheses, so that all wrong fields are told.
 
+use super::explain::Probe;
 use super::outline::Kind;
 use super::source::Cursor;
-use crate::description::diagnostic::{Diagnostic, Diagnostics, Place, Severity, suggestion};
+use super::words;
+use crate::description::diagnostic::{Diagnostic, Diagnostics, Hints, Place, Severity};
 use ron::error::SpannedError;
 use ron::extensions::Extensions;
 use serde::de::DeserializeOwned;
@@ -19,6 +21,8 @@ pub(super) struct Report {
     pub(super) found: Diagnostics,
     /// Where each place stands in `found`: by the address of its text, and its bytes.
     known: HashMap<(usize, Range<usize>), usize>,
+    /// For what was probably meant.
+    pub(super) hints: Hints,
 }
 
 impl Report {
@@ -35,7 +39,7 @@ impl Report {
         let diagnostic = Diagnostic {
             severity: Severity::Error,
             code,
-            message: message.into(),
+            message: clipped(message.into()),
             place: Some(place),
             label: label.to_owned(),
             related: Vec::new(),
@@ -59,6 +63,16 @@ impl Report {
     }
 }
 
+/// A message with no more of a name than a reader can take in.
+fn clipped(mut message: String) -> String {
+    const MOST: usize = 1000;
+    if let Some((end, _)) = message.char_indices().nth(MOST) {
+        message.truncate(end);
+        message.push('…');
+    }
+    message
+}
+
 fn options() -> ron::Options {
     ron::Options::default()
         .with_default_extension(Extensions::IMPLICIT_SOME)
@@ -71,17 +85,18 @@ pub(super) fn decode<T: DeserializeOwned>(cursor: &Cursor, report: &mut Report) 
         Ok(value) => return Some(value),
         Err(error) => error,
     };
+    let probe = Probe { cursor, around: ("", ""), read: &read_again::<T> };
     let fields: Vec<_> = cursor.entries().filter(|entry| !entry.key.is_empty()).collect();
     let mut told = false;
     if cursor.node.kind == Kind::Tuple && fields.len() > 1 {
         for field in &fields {
             if let Err(error) = decode_field::<T>(cursor.name(), field) {
-                told |= tell(&error, cursor, report);
+                told |= tell(&error, &probe, report);
             }
         }
     }
     if !told {
-        tell(&Misread::new(error, cursor.text(), cursor.node.span.start as usize), cursor, report);
+        tell(&Misread::new(error, cursor.text(), cursor.node.span.start as usize), &probe, report);
     }
     None
 }
@@ -100,12 +115,24 @@ pub(super) fn decode_fields<T: DeserializeOwned>(
                 text.push(',');
             }
             Err(error) => {
-                tell(&error, field, report);
+                let key = &field.source.text[field.key.range()];
+                let around = (format!("({key}: "), ")");
+                let around = (around.0.as_str(), around.1);
+                let probe = Probe { cursor: field, around, read: &read_again::<T> };
+                tell(&error, &probe, report);
             }
         }
     }
     text.push(')');
     options().from_str(&text).ok()
+}
+
+/// Reads a text for what that says; where it stopped is a byte of the text.
+fn read_again<T: DeserializeOwned>(text: &str) -> Result<(), (usize, SpannedError)> {
+    options()
+        .from_str::<T>(text)
+        .map(drop)
+        .map_err(|error| (byte_of(text, error.span.start.line, error.span.start.col), error))
 }
 
 fn entry_text<'a>(field: &Cursor<'a>) -> &'a str {
@@ -160,26 +187,29 @@ fn culprit<'a>(misread: &Misread, cursor: &Cursor<'a>) -> Cursor<'a> {
 }
 
 /// Puts an error of `ron` into words. Returns true, for it has been told.
-fn tell(misread: &Misread, cursor: &Cursor, report: &mut Report) -> bool {
+fn tell(misread: &Misread, probe: &Probe, report: &mut Report) -> bool {
     use ron::Error as E;
+    let cursor = probe.cursor;
     let last = cursor.deepest(misread.at.start);
     let value = culprit(misread, cursor);
     match &misread.code {
-        E::NoSuchStructField { expected, found, outer } => {
+        E::NoSuchStructField { expected, found, outer } if !last.key.is_empty() => {
             let inside = last.path.rsplit('.').nth(1);
             let message = match inside.or(outer.as_deref()) {
                 Some(inside) if !inside.is_empty() => format!("`{inside}` has no field `{found}`"),
                 _ => format!("there is no field `{found}` here"),
             };
-            report.error("scene::unknown-field", last.key_place(), &last.path, message).help =
-                suggestion(found, expected.iter().copied(), "fields");
+            let help = words::hint(found, expected)
+                .or_else(|| report.hints.suggestion(found, expected.iter().copied(), "fields"));
+            report.error("scene::unknown-field", last.key_place(), &last.path, message).help = help;
         }
         E::NoSuchEnumVariant { expected, found, .. } => {
             let span = if value.node.name.is_empty() { value.node.span } else { value.node.name };
             let message = format!("there is no `{found}` to choose here");
             let place = value.source.place(span.range());
-            report.error("scene::unknown-variant", place, &value.path, message).help =
-                suggestion(found, expected.iter().copied(), "possible");
+            let help = words::hint(found, expected)
+                .or_else(|| report.hints.suggestion(found, expected.iter().copied(), "possible"));
+            report.error("scene::unknown-variant", place, &value.path, message).help = help;
         }
         E::MissingStructField { field, outer } => {
             let whole = enclosing(cursor, misread.at.end);
@@ -193,41 +223,35 @@ fn tell(misread: &Misread, cursor: &Cursor, report: &mut Report) -> bool {
             let message = format!("the field `{field}` is given twice");
             report.error("scene::duplicate", last.key_place(), &last.path, message);
         }
-        E::InvalidValueForType { expected, found } => {
-            report.at("scene::wrong-type", &value, format!("expected {expected}, found {found}"));
-        }
         E::IntegerOutOfBounds => {
             let message = format!("{} is out of the range of this integer", shown(&value));
             report.at("scene::out-of-range", &value, message);
         }
-        code => {
-            let expected = match code {
-                E::ExpectedFloat => "a number",
-                E::ExpectedInteger => "an integer",
-                E::ExpectedBoolean => "`true` or `false`",
-                E::ExpectedString => "a string in double quotes",
-                E::ExpectedArray => "a list `[…]`",
-                E::ExpectedMap => "a map `{…}`",
-                E::ExpectedIdentifier => "a name without quotes",
-                E::ExpectedStructLike | E::ExpectedNamedStructLike(_) => "parentheses `(…)`",
-                _ => "",
-            };
-            let message = match code {
-                _ if !expected.is_empty() => {
-                    format!("expected {expected}, found {}", shown(&value))
-                }
-                E::ExpectedDifferentLength { expected, found } => {
-                    format!("expected {expected}, found {found} values")
-                }
-                E::ExpectedComma | E::ExpectedStructLikeEnd | E::TrailingCharacters => {
-                    format!("expected nothing more after this, found {}", shown(&value))
-                }
-                other => other.to_string(),
-            };
-            report.at("scene::wrong-type", &value, message);
-        }
+        code => wrong_type(code, &value, probe, report),
     }
     true
+}
+
+/// Tells what was expected in the place of a value.
+fn wrong_type(code: &ron::Error, value: &Cursor, probe: &Probe, report: &mut Report) {
+    use ron::Error as E;
+    let expected = probe.expected(value);
+    let message = match (&expected, code) {
+        // What a type of ours says itself is more to the point than what fits.
+        (_, E::ExpectedDifferentLength { expected, found }) if !expected.contains("sequence") => {
+            format!("expected {expected}, found {found} values")
+        }
+        (_, E::InvalidValueForType { expected, found }) => {
+            format!("expected {expected}, found {found}")
+        }
+        (Some(expected), _) => format!("expected {}, found {}", expected.what, shown(value)),
+        (None, E::ExpectedComma | E::ExpectedStructLikeEnd | E::TrailingCharacters) => {
+            format!("expected nothing more after this, found {}", shown(value))
+        }
+        (None, other) => format!("{other}, found {}", shown(value)),
+    };
+    report.at("scene::wrong-type", value, message).help =
+        expected.and_then(|expected| expected.help);
 }
 
 /// The innermost value with parentheses around the byte `at`, or ending there.

@@ -1,13 +1,12 @@
 //! Entities: each field read alone, then what the fields mean together.
 
-use super::Names;
 use super::decode::{Report, decode};
 use super::light;
 use super::limits;
 use super::motion::{self, Pose};
 use super::source::Cursor;
 use super::surface::{self, reference};
-use crate::description::diagnostic::suggestion;
+use super::{Names, words};
 use crate::description::{
     Camera, EmissionStrength, EntityDescription, Focus, Keyframes, Shape, Transform,
 };
@@ -61,9 +60,11 @@ pub(super) fn read_entity(
             }
             other => {
                 let message = format!("an entity has no field `{other}`");
+                let help = words::hint(other, &FIELDS)
+                    .or_else(|| report.hints.suggestion(other, FIELDS, "fields"));
                 report
                     .error("scene::unknown-field", field.key_place(), &field.path, message)
-                    .help = suggestion(other, FIELDS, "fields");
+                    .help = help;
             }
         }
     }

@@ -5,6 +5,7 @@
 //! links followed, lie inside one of these folders, unless the job allows more.
 
 use super::LoadOptions;
+use crate::description::diagnostic::Hints;
 use std::path::{Path, PathBuf};
 
 /// Greatest size of a scene file in bytes. Larger things belong into mesh and image files.
@@ -71,6 +72,7 @@ pub(super) fn find(
     dir: Option<&Path>,
     options: &LoadOptions,
     limit: u64,
+    hints: &mut Hints,
 ) -> Result<PathBuf, FileError> {
     let owned = || name.to_owned();
     if !options.allow_outside && Path::new(name).has_root() {
@@ -90,7 +92,7 @@ pub(super) fn find(
     if outside {
         return Err(FileError::Outside { name: owned() });
     }
-    Err(FileError::Missing { name: owned(), near: near(name, &roots) })
+    Err(FileError::Missing { name: owned(), near: near(name, &roots, hints) })
 }
 
 /// Checks that a path leads to a file of at most `limit` bytes.
@@ -110,7 +112,7 @@ pub(super) fn check(name: &str, path: &Path, limit: u64) -> Result<(), FileError
 }
 
 /// A file in the folders whose name is like the one looked for.
-fn near(name: &str, roots: &[PathBuf]) -> Option<String> {
+fn near(name: &str, roots: &[PathBuf], hints: &mut Hints) -> Option<String> {
     let wanted = Path::new(name);
     let folder = wanted.parent().unwrap_or(Path::new(""));
     if folder.components().any(|part| part == std::path::Component::ParentDir) {
@@ -123,8 +125,7 @@ fn near(name: &str, roots: &[PathBuf]) -> Option<String> {
         .flat_map(|entries| entries.take(4096).filter_map(Result::ok))
         .filter_map(|entry| folder.join(entry.file_name()).to_str().map(str::to_owned))
         .collect();
-    crate::description::diagnostic::nearest(name, names.iter().map(String::as_str))
-        .map(str::to_owned)
+    hints.nearest(name, names.iter().map(String::as_str)).map(str::to_owned)
 }
 
 #[cfg(test)]
@@ -151,7 +152,7 @@ mod tests {
     }
 
     fn found(name: &str, dir: &Path, options: &LoadOptions) -> Result<String, &'static str> {
-        find(name, Some(dir), options, 100)
+        find(name, Some(dir), options, 100, &mut Hints::default())
             .map(|path| fs::read_to_string(path).expect("it was found"))
             .map_err(|error| error.code())
     }
@@ -203,14 +204,16 @@ mod tests {
         let options = LoadOptions::default();
         assert_eq!(found("assets", &scenes, &options), Err("scene::not-a-file"));
         assert_eq!(found("", &scenes, &options), Err("scene::not-a-file"));
-        let too_large = find("beside.png", Some(&scenes), &options, 5).expect_err("25 bytes");
+        let too_large = find("beside.png", Some(&scenes), &options, 5, &mut Hints::default())
+            .expect_err("25 bytes");
         assert_eq!(too_large.code(), "scene::too-large");
     }
 
     #[test]
     fn a_misspelt_file_is_told_with_the_one_that_was_meant() {
         let (_root, scenes) = project();
-        let error = find("besid.png", Some(&scenes), &LoadOptions::default(), 100);
+        let error =
+            find("besid.png", Some(&scenes), &LoadOptions::default(), 100, &mut Hints::default());
         let help = error.expect_err("it is misspelt").help();
         assert_eq!(help.as_deref(), Some("did you mean `beside.png`?"));
     }

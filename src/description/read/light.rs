@@ -13,7 +13,7 @@ use serde::Deserialize;
 #[serde(rename = "emission", deny_unknown_fields)]
 enum EmissionFile {
     Radiance(Value<Rgb, String>),
-    Power(Rgb),
+    Power(#[serde(deserialize_with = "crate::description::value::color")] Rgb),
     /// The colour of a blackbody, and its luminance in units of radiance.
     Temperature {
         kelvin: f32,

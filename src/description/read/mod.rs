@@ -12,8 +12,10 @@
 mod assemble;
 mod decode;
 mod entity;
+mod explain;
 mod extrude;
 mod files;
+mod foreign;
 mod light;
 mod limits;
 mod motion;
@@ -28,6 +30,7 @@ mod surface;
 mod tests;
 mod texture;
 mod waves;
+mod words;
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, Severity, SourceText};
 use super::scene::SceneDescription;
@@ -69,6 +72,9 @@ pub fn load_scene(path: &Path, options: &LoadOptions) -> Result<SceneDescription
     });
     match text {
         Ok(bytes) => {
+            if let Some(other) = foreign::recognised(path, &bytes) {
+                return Err(other);
+            }
             loader.files.push(path.to_owned());
             loader.root = path.canonicalize().ok();
             let hashed = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -238,11 +244,14 @@ impl<'o> Loader<'o> {
         for entry in include.entries() {
             let name = outline::unquoted(entry.text());
             let dir = source.dir.as_deref();
-            let read = files::find(&name, dir, self.options, MAX_SCENE_BYTES).and_then(|path| {
-                let unreadable = |source| FileError::Unreadable { name: name.clone(), source };
-                let bytes = std::fs::read(&path).map_err(unreadable)?;
-                Ok((path, bytes))
-            });
+            let read =
+                files::find(&name, dir, self.options, MAX_SCENE_BYTES, &mut self.report.hints)
+                    .and_then(|path| {
+                        let unreadable =
+                            |source| FileError::Unreadable { name: name.clone(), source };
+                        let bytes = std::fs::read(&path).map_err(unreadable)?;
+                        Ok((path, bytes))
+                    });
             match read {
                 Ok((path, bytes)) => self.include(&entry, &name, path, bytes),
                 Err(error) => {

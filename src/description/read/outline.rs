@@ -11,6 +11,9 @@ use std::ops::Range;
 /// Greatest depth of nested brackets. Deeper than any scene, and safe for recursion.
 pub(super) const MAX_DEPTH: usize = 64;
 
+/// Greatest length of a name in bytes: every path of a value in it repeats the name.
+pub(super) const MAX_NAME: usize = 1024;
+
 /// Bytes of a text; half the size of a `Range<usize>`, for there is one per number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct Span {
@@ -93,6 +96,15 @@ pub(super) fn unquoted(text: &str) -> String {
     } else {
         text.to_owned()
     }
+}
+
+fn check_name(name: Span) -> Result<(), SyntaxError> {
+    let length = name.range().len();
+    if length <= MAX_NAME {
+        return Ok(());
+    }
+    let message = format!("a name has at most {MAX_NAME} bytes, but this one has {length}");
+    Err(SyntaxError { message, span: name.range(), opened: None })
 }
 
 struct Parser<'a> {
@@ -242,6 +254,7 @@ impl<'a> Parser<'a> {
         let end = self.at;
         self.skip_blank()?;
         if is_name && self.peek() == Some('(') {
+            check_name(word.span)?;
             return self.group(start, word.span, depth);
         }
         self.at = end;
@@ -307,6 +320,7 @@ impl<'a> Parser<'a> {
             if self.peek().is_none() {
                 return Err(self.unclosed(opened.clone(), close));
             }
+            check_name(value.span)?;
             return Ok(Entry { key: value.span, value: self.value(depth + 1)? });
         }
         if kind == Kind::Map {
@@ -374,6 +388,16 @@ mod tests {
             (error.message.as_str(), error.span),
             ("this `(` is never closed by a `)`", 4..5)
         );
+    }
+
+    #[test]
+    fn names_end_somewhere() {
+        let long = "x".repeat(MAX_NAME);
+        assert!(parse(&format!("({long}: {long}(1))")).is_ok());
+        for text in [format!("(x{long}: 1)"), format!("x{long}(1)"), format!("{{\"{long}\": 1}}")] {
+            let error = parse(&text).expect_err("the name is too long");
+            assert!(error.message.contains("at most 1024 bytes"), "{}", error.message);
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use super::decode::Report;
 use super::outline::{self, Kind, Node};
 use super::source::{Piece, Source};
-use crate::description::diagnostic::{Place, SourceText, suggestion};
+use crate::description::diagnostic::{Place, SourceText};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -59,7 +59,7 @@ pub(super) fn apply(sources: &mut [Source], path: &str, value: &str, report: &mu
         let message = format!("there is no setting `{path}`");
         let fields = FIELDS.iter().copied().filter(|&field| field != "include");
         report.error("scene::unknown-setting", whole, path, message).help =
-            suggestion(steps[0], fields, "it may begin with");
+            report.hints.suggestion(steps[0], fields, "it may begin with");
         return;
     }
     // The file whose text leads furthest; the root file has the last word.
@@ -88,7 +88,7 @@ pub(super) fn apply(sources: &mut [Source], path: &str, value: &str, report: &mu
         };
         let guess = rest.first().copied().unwrap_or_default();
         report.error("scene::unknown-setting", whole, path, message).help =
-            suggestion(guess, reached.names.iter().map(String::as_str), "there is");
+            report.hints.suggestion(guess, reached.names.iter().map(String::as_str), "there is");
         return;
     };
     if let Err(error) = sources[index].replace(range, pieces) {

@@ -1,22 +1,26 @@
 //! What only shows when all definitions are known: cycles, the camera, colours of textures.
 
 use super::decode::Report;
+use super::outline::Kind;
 use super::source::Cursor;
 use super::surface::reference;
 use super::{LoadOptions, Names};
-use crate::description::diagnostic::{Diagnostic, Diagnostics, Severity, suggestion};
+use crate::description::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::description::{
     EmissionStrength, Encoding, ImagePixels, Light, Material, Rgb, SceneDescription, SceneTexture,
     Shape, Texture, Value,
 };
-use crate::math::Profile;
+use crate::math::{GraphFault, MAX_PARTS_DEPTH, Profile, parts_first};
 use indexmap::IndexMap;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-/// Reports entities which are their own ancestors, and materials and textures made of themselves.
+/// The parts of things by name: the field that names each, and its name.
+type Parts<'a> = IndexMap<&'a str, Vec<(&'a str, &'a str)>>;
+
+/// Reports entities which are their own ancestors, and materials and textures made of themselves or of too many.
 pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut Report) {
-    let parents: IndexMap<&str, Vec<(&str, &str)>> = scene
+    let parents: Parts = scene
         .entities
         .iter()
         .map(|(name, entity)| {
@@ -30,7 +34,7 @@ pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut
         let message = format!("`{name}` is its own ancestor: {path}");
         report.at("scene::cycle", &names.entities[name].at(field), message);
     }
-    let parts: IndexMap<&str, Vec<(&str, &str)>> = scene
+    let parts: Parts = scene
         .materials
         .iter()
         .map(|(name, material)| {
@@ -44,26 +48,23 @@ pub(super) fn check_cycles(scene: &SceneDescription, names: &Names, report: &mut
             (name.as_str(), parts)
         })
         .collect();
-    for (name, field, path) in cycles(&parts) {
-        let message = format!("the material `{name}` is made of itself: {path}");
-        report.at("scene::cycle", &names.materials[name].at(field), message);
-    }
-    let parts: IndexMap<&str, Vec<(&str, &str)>> = scene
-        .textures
-        .iter()
-        .map(|(name, texture)| {
-            let parts = texture.refs().map(|(field, part)| (field, part.as_str()));
-            (name.as_str(), parts.collect())
-        })
-        .collect();
-    for (name, field, path) in cycles(&parts) {
-        let message = format!("the texture `{name}` is made of itself: {path}");
-        report.at("scene::cycle", &names.textures[name].at(field), message);
-    }
+    check_parts(&parts, "material", &names.materials, report);
+    let parts = texture_parts(scene);
+    check_parts(&parts, "texture", &names.textures, report);
+    check_lookups(scene, &parts, names, report);
 }
 
-/// Reports meshes which are made from themselves, by what their text says of `of`.
-pub(super) fn check_mesh_cycles(names: &Names, report: &mut Report) {
+fn texture_parts(scene: &SceneDescription) -> Parts<'_> {
+    let textures = scene.textures.iter();
+    let parts = textures.map(|(name, texture)| {
+        let parts = texture.refs().map(|(field, part)| (field, part.as_str()));
+        (name.as_str(), parts.collect())
+    });
+    parts.collect()
+}
+
+/// Reports meshes which are made of themselves or of too many, by what their text says of `of`. Whether there is none.
+pub(super) fn check_mesh_parts(names: &Names, report: &mut Report) -> bool {
     let of: HashMap<&str, String> = names
         .meshes
         .iter()
@@ -72,28 +73,108 @@ pub(super) fn check_mesh_cycles(names: &Names, report: &mut Report) {
             Some((name.as_str(), super::outline::unquoted(part.text())))
         })
         .collect();
-    let parts: IndexMap<&str, Vec<(&str, &str)>> = names
+    let parts: Parts = names
         .meshes
         .keys()
         .map(|name| (name.as_str(), of.get(name.as_str()).map(|part| ("of", part.as_str()))))
         .map(|(name, part)| (name, part.into_iter().collect()))
         .collect();
-    for (name, field, path) in cycles(&parts) {
-        let message = format!("the mesh `{name}` is made from itself: {path}");
-        report.at("scene::cycle", &names.meshes[name].at(field), message);
+    check_parts(&parts, "mesh", &names.meshes, report)
+}
+
+/// Reports things which are made of themselves, or of too many in a row. Whether there is none.
+fn check_parts(
+    parts: &Parts,
+    what: &str,
+    defined: &IndexMap<String, Cursor>,
+    report: &mut Report,
+) -> bool {
+    let cycles = cycles(parts);
+    for (name, field, path) in &cycles {
+        let message = format!("the {what} `{name}` is made of itself: {path}");
+        report.at("scene::cycle", &defined[*name].at(field), message);
+    }
+    let Err(GraphFault::TooDeep(node)) = order(parts) else { return cycles.is_empty() };
+    let (name, below) = parts.get_index(node as usize).expect("it is one of them");
+    let field = below.first().map_or("", |(field, _)| field);
+    let message =
+        format!("the {what} `{name}` is made of more than {MAX_PARTS_DEPTH} others in a row");
+    report.at("scene::too-deep", &defined[*name].at(field), message).help =
+        Some("say it in fewer steps, each made of the one before".to_owned());
+    false
+}
+
+/// The places of things in an order in which each comes after its parts; names of nothing are left out.
+fn order(parts: &Parts) -> Result<Vec<u32>, GraphFault> {
+    parts_first(parts.len() as u32, |index| {
+        let (_, below) = parts.get_index(index as usize).expect("it is one of them");
+        below.iter().filter_map(|(_, part)| parts.get_index_of(part)).map(|k| k as u32).collect()
+    })
+}
+
+/// So many lookups of others may a texture take at one point.
+const MAX_LOOKUPS: u64 = 1 << 16;
+
+/// Reports textures which take too many lookups of others at one point.
+///
+/// Each counts once there, however many ways lead to it. But `Placed`, `Triplanar` and `Drift` look elsewhere, so that two
+/// of them made of the same, and that of two again, double the work with every level.
+fn check_lookups(scene: &SceneDescription, parts: &Parts, names: &Names, report: &mut Report) {
+    let Ok(order) = order(parts) else { return };
+    let elsewhere = |name: &str| match scene.textures[name] {
+        Texture::Triplanar { .. } => 3,
+        Texture::Placed { .. } | Texture::Drift { .. } => 1,
+        _ => 0,
+    };
+    let below =
+        |index: usize| parts[index].iter().filter_map(|(_, part)| parts.get_index_of(*part));
+    // At most so many; found exactly, by walking, only where the sum over all ways would be too many.
+    let mut lookups = vec![1_u64; parts.len()];
+    for index in order.into_iter().map(|index| index as usize) {
+        let (name, _) = parts.get_index(index).expect("it is one of them");
+        let times = elsewhere(name).max(1);
+        let sum = below(index).map(|part| lookups[part].saturating_mul(times));
+        lookups[index] = sum.fold(1, u64::saturating_add);
+        if lookups[index] <= MAX_LOOKUPS {
+            continue;
+        }
+        let (mut open, mut seen, mut count) = (vec![index], HashSet::new(), 0_u64);
+        while let Some(at) = open.pop() {
+            if !seen.insert(at) {
+                continue;
+            }
+            count = count.saturating_add(1);
+            match elsewhere(parts.get_index(at).expect("it is one of them").0) {
+                0 => open.extend(below(at)),
+                times => {
+                    let moved = below(at).map(|part| lookups[part].saturating_mul(times));
+                    count = moved.fold(count, u64::saturating_add);
+                }
+            }
+        }
+        lookups[index] = count;
+        if count > MAX_LOOKUPS {
+            let message = format!(
+                "the texture `{name}` looks up more than {MAX_LOOKUPS} others for every point"
+            );
+            report.at("scene::too-many", &names.textures[*name], message).help =
+                Some("put fewer `Placed`, `Triplanar` and `Drift` into one another".to_owned());
+            return;
+        }
     }
 }
 
+/// So many names of a way around are told.
+const TOLD: usize = 8;
+
 /// The cycles of a graph, each once: the node and edge that close it, and the way around.
-fn cycles<'a>(
-    edges: &IndexMap<&'a str, Vec<(&'a str, &'a str)>>,
-) -> Vec<(&'a str, &'a str, String)> {
+fn cycles<'a>(edges: &Parts<'a>) -> Vec<(&'a str, &'a str, String)> {
     let mut found = Vec::new();
     let mut done = vec![false; edges.len()];
+    let mut on_way = vec![false; edges.len()];
     for start in 0..edges.len() {
         // Depth first, without recursion: a chain of parents may be long.
         let mut way: Vec<(usize, usize)> = Vec::new();
-        let mut on_way = vec![false; if done[start] { 0 } else { edges.len() }];
         if !done[start] {
             way.push((start, 0));
             on_way[start] = true;
@@ -112,7 +193,11 @@ fn cycles<'a>(
                 let from = way.iter().position(|(node, _)| *node == target).unwrap_or(0);
                 let label =
                     |node: usize| format!("`{}`", edges.get_index(node).map_or("", |e| e.0));
-                let around: Vec<_> = way[from..].iter().map(|(node, _)| label(*node)).collect();
+                let around = way[from..].iter().take(TOLD);
+                let mut around: Vec<_> = around.map(|(node, _)| label(*node)).collect();
+                if way.len() - from > TOLD {
+                    around.push("…".to_owned());
+                }
                 found.push((*name, *field, format!("{} → {}", around.join(" → "), label(target))));
             } else if !done[target] {
                 on_way[target] = true;
@@ -142,6 +227,7 @@ pub(super) fn choose_camera(
         if available().any(|camera| camera == name) {
             scene.camera.clone_from(name);
         } else {
+            let help = report.hints.suggestion(name, available(), "cameras");
             report.found.0.push(Diagnostic {
                 severity: Severity::Error,
                 code: "scene::camera",
@@ -149,19 +235,28 @@ pub(super) fn choose_camera(
                 place: None,
                 label: String::new(),
                 related: Vec::new(),
-                help: suggestion(name, available(), "cameras"),
+                help,
             });
         }
         return;
     }
     if let Some(cursor) = chosen {
+        if cursor.node.kind != Kind::Text {
+            let message = "`camera` is the name of the entity to look through, in double quotes";
+            report.at("scene::wrong-type", cursor, message).help = Some(
+                "a camera is an entity: `entities: {\"camera\": (transform: (translation: (0, 1, 5), \
+                 look_at: (0, 0, 0)), camera: (fov: 40))}`"
+                    .to_owned(),
+            );
+            return;
+        }
         let Some(name) = super::decode::decode::<String>(cursor, report) else { return };
         if available().any(|camera| camera == name) {
             scene.camera = name;
         } else if names.entities.contains_key(&name) {
             let message = format!("the entity `{name}` has no camera");
             report.at("scene::camera", cursor, message).help =
-                suggestion(&name, available(), "cameras");
+                report.hints.suggestion(&name, available(), "cameras");
         } else {
             reference(report, cursor, &name, &names.entities, "entity", "entities");
         }
@@ -196,6 +291,7 @@ pub(super) fn choose_camera(
 /// Reports procedural textures which reflect more light than there is. Colours are only known as
 /// shares where they are used, for the same texture may give radiance elsewhere.
 pub(super) fn check_shares(scene: &SceneDescription, names: &Names, report: &mut Report) {
+    let greatest = greatest_values(scene);
     for (name, material) in &scene.materials {
         let colors = match material {
             Material::Diffuse { albedo } | Material::Plastic { albedo, .. } => ("albedo", albedo),
@@ -206,7 +302,7 @@ pub(super) fn check_shares(scene: &SceneDescription, names: &Names, report: &mut
             _ => continue,
         };
         let (field, Value::Texture(texture)) = colors else { continue };
-        if scene.textures.get(texture).is_some_and(|t| greatest(t, scene, 0) > 1.0) {
+        if greatest.get(texture.as_str()).is_some_and(|greatest| *greatest > 1.0) {
             let message =
                 format!("`{field}` must be at most 1, but the texture `{texture}` goes beyond");
             report.at("scene::out-of-range", &names.materials[name].at(field), message);
@@ -245,15 +341,21 @@ pub(super) fn check_absorption(scene: &SceneDescription, names: &Names, report: 
     }
 }
 
-/// The greatest value of a texture made of patterns; 0 where it is not known before looking at pixels.
-fn greatest(texture: &SceneTexture, scene: &SceneDescription, depth: usize) -> f32 {
-    // Cycles are reported elsewhere.
-    if depth > scene.textures.len() {
-        return 0.0;
+/// The greatest value of each texture made of patterns; 0 where it is not known before looking at pixels. None where
+/// textures have no order, which is reported elsewhere.
+fn greatest_values(scene: &SceneDescription) -> HashMap<&str, f32> {
+    let parts = texture_parts(scene);
+    let mut known = HashMap::new();
+    for index in order(&parts).unwrap_or_default() {
+        let (&name, _) = parts.get_index(index as usize).expect("it is one of them");
+        known.insert(name, greatest(&scene.textures[name], &known));
     }
-    let of = |name: &String| {
-        scene.textures.get(name).map_or(0.0, |texture| greatest(texture, scene, depth + 1))
-    };
+    known
+}
+
+/// The greatest value of a texture, when those of its parts are known.
+fn greatest(texture: &SceneTexture, known: &HashMap<&str, f32>) -> f32 {
+    let of = |name: &String| known.get(name.as_str()).copied().unwrap_or(0.0);
     let value = |value: &Value<Rgb, String>| match value {
         Value::Constant(color) => color.max_element(),
         Value::Texture(name) => of(name),

@@ -6,13 +6,13 @@ use super::limits::{self, Limits};
 use super::profile::read_revolution;
 use super::source::Cursor;
 use crate::description::assets::MAX_MESH_ELEMENTS;
-use crate::description::diagnostic::suggestion;
 use crate::description::modelling::{Alignment, Subdivision, TessellationError, tessellated};
 use crate::description::{
     Curve, Dispersion, Displacement, Material, PhaseFunction, Relief, Rgb, Shape, TriangleMesh,
     Value, Wave,
 };
 use crate::math::Chart;
+use crate::memory::ask;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use indexmap::IndexMap;
 use serde::Deserialize;
@@ -156,7 +156,7 @@ pub(super) fn reference(
     if !defined.contains_key(name) {
         let message = format!("there is no {what} named `{name}`");
         report.at("scene::unknown-name", cursor, message).help =
-            suggestion(name, defined.keys().map(String::as_str), plural);
+            report.hints.suggestion(name, defined.keys().map(String::as_str), plural);
     }
 }
 
@@ -480,8 +480,17 @@ pub(super) fn check_levels(
     check_triangle_count(&place, count, report).then_some(())
 }
 
+/// Whether a mesh of so many triangles may be made: by the limit of all meshes, and by the memory that there is.
 pub(super) fn check_triangle_count(place: &Cursor, count: f64, report: &mut Report) -> bool {
+    /// Three indices, and half a vertex with place, normal and coordinates; the lists double while they grow, and a
+    /// subdivision looks for the neighbours of every edge.
+    const BYTES: f64 = 64.0;
     let fine = count <= MAX_MESH_ELEMENTS as f64;
+    if fine && let Err(shortage) = ask((count * BYTES) as u64) {
+        let message = format!("there is no memory for a mesh of {count} triangles: {shortage}");
+        report.at("scene::memory", place, message);
+        return false;
+    }
     if !fine {
         let message = format!(
             "a mesh has at most {MAX_MESH_ELEMENTS} triangles, but this would have {count}"

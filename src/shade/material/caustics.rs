@@ -6,6 +6,7 @@ use crate::color::luminance;
 use crate::description::{Rgb, Value};
 use crate::shade::bsdf::{SCHLICK_AVERAGE, normal_reflectance};
 use glam::Vec2;
+use std::collections::{HashMap, HashSet};
 
 /// Places along each side of the unit square at which a material is looked at.
 const PLACES: u32 = 8;
@@ -45,9 +46,56 @@ impl MaterialTable {
             let uv = uv / PLACES as f32;
             let at = TexturePoint { p: uv.extend(0.0).as_dvec3(), ..TexturePoint::at(uv) };
             let weight = 1.0 / f64::from(PLACES * PLACES);
-            self.add_lobes(material, &at, weight, min_alpha, &mut lobes);
+            for (part, area) in self.areas(material, &at) {
+                self.add_lobes(part, &at, weight * area, min_alpha, &mut lobes);
+            }
         }
         lobes
+    }
+
+    /// The materials which one is made of at a point, those that are made of no others, and how much of the area each has.
+    ///
+    /// Each is asked once, when all that is made of it is known: as many ways as there are may lead to it.
+    fn areas(&self, material: u32, at: &TexturePoint) -> Vec<(u32, f64)> {
+        let mut order = Vec::new();
+        self.put_parts_first(material, &mut HashSet::new(), &mut order);
+        let mut areas: HashMap<u32, f64> = HashMap::from([(material, 1.0)]);
+        let number = |value: &Value<f32, u32>| f64::from(self.scalar(value, at).clamp(0.0, 1.0));
+        let mut leaves = Vec::new();
+        for part in order.into_iter().rev() {
+            let area = areas[&part];
+            let mut give = |part: u32, share: f64| *areas.entry(part).or_default() += area * share;
+            match &self.materials[part as usize].kind {
+                Kind::Mix { a, b, amount } => {
+                    let amount = number(amount);
+                    give(*a, 1.0 - amount);
+                    give(*b, amount);
+                }
+                Kind::Masked { material, opacity } => give(*material, number(opacity)),
+                Kind::Relief { material } => give(*material, 1.0),
+                _ => leaves.push((part, area)),
+            }
+        }
+        leaves
+    }
+
+    /// The parts of a material and itself, each after its own parts.
+    fn put_parts_first(&self, material: u32, seen: &mut HashSet<u32>, order: &mut Vec<u32>) {
+        if !seen.insert(material) {
+            return;
+        }
+        match &self.materials[material as usize].kind {
+            Kind::Mix { a, b, .. } => {
+                // The first of them is the last of the order, and so the first to be asked.
+                self.put_parts_first(*b, seen, order);
+                self.put_parts_first(*a, seen, order);
+            }
+            Kind::Masked { material, .. } | Kind::Relief { material } => {
+                self.put_parts_first(*material, seen, order);
+            }
+            _ => {}
+        }
+        order.push(material);
     }
 
     /// Whether some lobe of a material casts caustics which photons bring and which are worth having.
@@ -56,7 +104,7 @@ impl MaterialTable {
         lobes.any(|lobe| lobe.for_photons && lobe.is_strong())
     }
 
-    /// Adds what a material has at a point.
+    /// Adds what a material that is made of no others has at a point.
     fn add_lobes(
         &self,
         material: u32,
@@ -105,15 +153,9 @@ impl MaterialTable {
                 add(reflected, *width, diffuse);
                 add((1.0 - schlick_average(f0)) * below * transmission, *width, diffuse);
             }
-            Kind::Mix { a, b, amount } => {
-                let amount = number(amount);
-                self.add_lobes(*a, at, area * (1.0 - amount), min_alpha, lobes);
-                self.add_lobes(*b, at, area * amount, min_alpha, lobes);
+            Kind::Mix { .. } | Kind::Masked { .. } | Kind::Relief { .. } => {
+                unreachable!("its parts are asked")
             }
-            Kind::Masked { material, opacity } => {
-                self.add_lobes(*material, at, area * number(opacity), min_alpha, lobes);
-            }
-            Kind::Relief { material } => self.add_lobes(*material, at, area, min_alpha, lobes),
         }
     }
 }

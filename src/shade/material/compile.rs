@@ -1,7 +1,7 @@
 //! Materials, compiled: what does not depend on the point is resolved.
 
 use super::relief::Relief;
-use super::{Compiled, Interior, MaterialTable, material_cycle};
+use super::{Compiled, Interior, MaterialTable, material_order};
 use crate::color::spectrum::WavelengthSet;
 use crate::description::{Material, Rgb, Scattering, Value, index_at_d};
 use crate::shade::bsdf::{
@@ -130,9 +130,9 @@ impl MaterialTable {
     /// Compiles the materials of a frame; their references are indices into `materials` and `textures`.
     ///
     /// # Panics
-    /// If a reference is out of range or [`material_cycle`] finds a cycle.
+    /// If a reference is out of range or [`material_order`] finds none.
     pub fn new(materials: &[Material<u32>], textures: Textures) -> Self {
-        assert_eq!(material_cycle(materials), None, "the description rejects cycles of materials");
+        let order = material_order(materials).expect("the description rejects what has no order");
         let mut table = Self {
             materials: Vec::new(),
             textures,
@@ -144,25 +144,28 @@ impl MaterialTable {
             spectral: Vec::new(),
             seen_at: None,
         };
-        let spectral = |index| has_spectrum(index, materials, &table.textures);
-        table.spectral = (0..materials.len() as u32).map(spectral).collect();
+        let parts = parts(&order, materials, &table.textures);
+        table.spectral = parts.iter().map(|parts| parts.has_spectrum).collect();
         let mut known = KnownTables::default();
         let kinds: Vec<Kind> =
             materials.iter().map(|material| table.compile(material, &mut known)).collect();
         let curves: Vec<Option<u32>> =
             materials.iter().map(|material| table.curve(material)).collect();
-        let solid_of = |index: u32| solid(index, materials).and_then(|k| curves[k as usize]);
         table.materials = kinds
-            .iter()
-            .enumerate()
-            .map(|(index, kind)| Compiled {
-                kind: kind.clone(),
-                has_opacity: has_opacity(index as u32, &kinds),
-                needs_lobe: needs_lobe(index as u32, &kinds),
-                interior: interior(index as u32, materials, &table.textures),
-                curve: solid_of(index as u32),
-                disperses: disperses(index as u32, materials),
-                relief: relief(&materials[index]),
+            .into_iter()
+            .zip(&parts)
+            .zip(materials)
+            .map(|((kind, parts), material)| Compiled {
+                kind,
+                has_opacity: parts.has_opacity,
+                lookups: parts.lookups,
+                needs_lobe: parts.needs_lobe,
+                interior: parts
+                    .solid
+                    .map(|solid| interior(&materials[solid as usize], &table.textures)),
+                curve: parts.solid.and_then(|solid| curves[solid as usize]),
+                disperses: parts.disperses,
+                relief: relief(material),
             })
             .collect();
         table
@@ -261,21 +264,62 @@ fn metal_color(
     }
 }
 
-fn has_opacity(index: u32, kinds: &[Kind]) -> bool {
-    match &kinds[index as usize] {
-        Kind::Masked { .. } => true,
-        Kind::Mix { a, b, .. } => has_opacity(*a, kinds) || has_opacity(*b, kinds),
-        Kind::Relief { material } => has_opacity(*material, kinds),
-        _ => false,
-    }
+/// What is true of a material because of those that it is made of.
+#[derive(Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is asked by itself")]
+struct Parts {
+    has_opacity: bool,
+    /// As in [`Compiled`].
+    lookups: u64,
+    needs_lobe: bool,
+    has_spectrum: bool,
+    disperses: bool,
+    /// The first solid, itself perhaps.
+    solid: Option<u32>,
 }
 
-fn needs_lobe(index: u32, kinds: &[Kind]) -> bool {
-    match &kinds[index as usize] {
-        Kind::Diffuse { .. } | Kind::Mirror { .. } => false,
-        Kind::Masked { material, .. } | Kind::Relief { material } => needs_lobe(*material, kinds),
-        _ => true,
+/// [`Parts`] of each material, asked in an order in which its parts come first.
+fn parts(order: &[u32], materials: &[Material<u32>], textures: &Textures) -> Vec<Parts> {
+    let mut all = vec![Parts::default(); materials.len()];
+    for &index in order {
+        let material = &materials[index as usize];
+        let mut own = Parts { lookups: 1, ..Parts::default() };
+        match material {
+            Material::Dielectric { dispersion, .. } => {
+                own.solid = Some(index);
+                own.disperses = dispersion.is_some();
+                own.needs_lobe = true;
+            }
+            Material::Masked { .. } => own.has_opacity = true,
+            Material::Diffuse { .. }
+            | Material::Mirror { .. }
+            | Material::Bump { .. }
+            | Material::NormalMap { .. } => {}
+            _ => own.needs_lobe = true,
+        }
+        let mut texture = |texture: u32| {
+            own.has_spectrum |= textures.is_spectrum(texture);
+            Ok::<_, std::convert::Infallible>(())
+        };
+        let mut found = Vec::new();
+        let Ok(_) = material.clone().map_refs(&mut texture, &mut |part: u32| {
+            found.push(part);
+            Ok(())
+        });
+        for part in found {
+            let part = all[part as usize];
+            own = Parts {
+                has_opacity: own.has_opacity || part.has_opacity,
+                lookups: own.lookups.saturating_add(part.lookups),
+                needs_lobe: own.needs_lobe || part.needs_lobe,
+                has_spectrum: own.has_spectrum || part.has_spectrum,
+                disperses: own.disperses || part.disperses,
+                solid: own.solid.or(part.solid),
+            };
+        }
+        all[index as usize] = own;
     }
+    all
 }
 
 fn relief(material: &Material<u32>) -> Option<Relief> {
@@ -288,20 +332,8 @@ fn relief(material: &Material<u32>) -> Option<Relief> {
     }
 }
 
-/// The first solid that a material is made of, itself perhaps.
-fn solid(index: u32, materials: &[Material<u32>]) -> Option<u32> {
-    match &materials[index as usize] {
-        Material::Dielectric { .. } => Some(index),
-        Material::Masked { material, .. }
-        | Material::Bump { material, .. }
-        | Material::NormalMap { material, .. } => solid(*material, materials),
-        Material::Mix { a, b, .. } => solid(*a, materials).or_else(|| solid(*b, materials)),
-        _ => None,
-    }
-}
-
-fn interior(index: u32, materials: &[Material<u32>], textures: &Textures) -> Option<Interior> {
-    let solid = solid(index, materials)?;
+/// What is inside a solid.
+fn interior(solid: &Material<u32>, textures: &Textures) -> Interior {
     let Material::Dielectric {
         ior,
         dispersion,
@@ -312,7 +344,7 @@ fn interior(index: u32, materials: &[Material<u32>], textures: &Textures) -> Opt
         density,
         priority,
         ..
-    } = &materials[solid as usize]
+    } = solid
     else {
         unreachable!("a solid is a dielectric")
     };
@@ -335,7 +367,7 @@ fn interior(index: u32, materials: &[Material<u32>], textures: &Textures) -> Opt
     });
     let emission = *emission * factor;
     let empty = sigma_a.is_none() && scattering.is_none() && emission == Rgb::ZERO;
-    Some(Interior {
+    Interior {
         ior: index_at_d(*ior, dispersion.as_ref()),
         sigma_a,
         absorption,
@@ -343,33 +375,6 @@ fn interior(index: u32, materials: &[Material<u32>], textures: &Textures) -> Opt
         emission,
         density: texture.filter(|_| !empty),
         priority: *priority,
-    })
-}
-
-/// Whether a material, or one that it is made of, looks at a spectrum.
-fn has_spectrum(index: u32, materials: &[Material<u32>], textures: &Textures) -> bool {
-    let mut found = false;
-    let mut parts = Vec::new();
-    let mut texture = |texture: u32| {
-        found |= textures.is_spectrum(texture);
-        Ok::<_, std::convert::Infallible>(())
-    };
-    let mut material = |material: u32| {
-        parts.push(material);
-        Ok(())
-    };
-    let Ok(_) = materials[index as usize].clone().map_refs(&mut texture, &mut material);
-    found || parts.into_iter().any(|part| has_spectrum(part, materials, textures))
-}
-
-fn disperses(index: u32, materials: &[Material<u32>]) -> bool {
-    match &materials[index as usize] {
-        Material::Dielectric { dispersion, .. } => dispersion.is_some(),
-        Material::Masked { material, .. }
-        | Material::Bump { material, .. }
-        | Material::NormalMap { material, .. } => disperses(*material, materials),
-        Material::Mix { a, b, .. } => disperses(*a, materials) || disperses(*b, materials),
-        _ => false,
     }
 }
 

@@ -19,16 +19,18 @@ use super::bsdf::{
 };
 use super::medium::Medium;
 use super::relative::RelativeTables;
-use super::texture::{TexturePoint, Textures};
+use super::texture::{Known, REMEMBER_ABOVE, TexturePoint, Textures};
 use crate::color::spectrum::WavelengthSet;
 use crate::description::{IndexCurve, Material, Rgb, Scattering, Value};
 use crate::extract::NOTHING;
+use crate::math::{GraphFault, parts_first};
 use compile::{Kind, MetalColor};
 use relief::Relief;
+use std::collections::HashSet;
 
 /// All materials of a frame and the textures which they read.
 ///
-/// References between materials must not form a cycle (see [`material_cycle`]), and every index must be
+/// References between materials must have an order (see [`material_order`]), and every index must be
 /// valid: the description sees to both. Reflectances, roughness and other shares read from a texture
 /// are limited to `[0, 1]`, which is where they are defined.
 #[derive(Clone, Debug)]
@@ -93,6 +95,8 @@ struct Compiled {
     kind: Kind,
     /// Whether it, or one that it is mixed of, is masked.
     has_opacity: bool,
+    /// How many lookups of opacity one would take that forgets what it has found.
+    lookups: u64,
     /// Whether it chooses among lobes or sides.
     needs_lobe: bool,
     /// Whether it, or the first solid that it is mixed of, encloses a medium.
@@ -114,40 +118,21 @@ pub struct Chosen {
     pub relief: Option<u32>,
 }
 
-/// A material which refers to itself through those that it is made of, if there is one.
+/// An order in which each material comes after those that it is made of.
+///
+/// # Errors
+/// When one is made of itself or of too many in a row.
 ///
 /// # Panics
 /// If a reference is out of range.
-pub fn material_cycle(materials: &[Material<u32>]) -> Option<u32> {
-    cycle(materials.len() as u32, |index| match materials[index as usize] {
+pub fn material_order(materials: &[Material<u32>]) -> Result<Vec<u32>, GraphFault> {
+    parts_first(materials.len() as u32, |index| match materials[index as usize] {
         Material::Mix { a, b, .. } => vec![a, b],
         Material::Masked { material, .. }
         | Material::Bump { material, .. }
         | Material::NormalMap { material, .. } => vec![material],
         _ => Vec::new(),
     })
-}
-
-/// A node of a graph that can be reached from itself, if there is one. `parts` are the nodes that a node refers to.
-pub fn cycle(count: u32, parts: impl Fn(u32) -> Vec<u32>) -> Option<u32> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Visit {
-        Not,
-        Open,
-        Done,
-    }
-    fn visit(index: u32, parts: &impl Fn(u32) -> Vec<u32>, visits: &mut [Visit]) -> Option<u32> {
-        match visits[index as usize] {
-            Visit::Done => return None,
-            Visit::Open => return Some(index),
-            Visit::Not => visits[index as usize] = Visit::Open,
-        }
-        let found = parts(index).into_iter().find_map(|part| visit(part, parts, visits));
-        visits[index as usize] = Visit::Done;
-        found
-    }
-    let mut visits = vec![Visit::Not; count as usize];
-    (0..count).find_map(|index| visit(index, &parts, &mut visits))
 }
 
 impl MaterialTable {
@@ -351,17 +336,56 @@ impl MaterialTable {
         if !compiled.has_opacity {
             return 1.0;
         }
-        match &compiled.kind {
+        if compiled.lookups <= REMEMBER_ABOVE {
+            return self.opacity_of(&compiled.kind, at, &mut |part| self.opacity(part, at));
+        }
+        self.opacity_once(material, at, &mut Known::default())
+    }
+
+    /// [`MaterialTable::opacity`] of what many ways lead to, each looked up once.
+    fn opacity_once(&self, material: u32, at: &TexturePoint, known: &mut Known<f32>) -> f32 {
+        let compiled = &self.materials[material as usize];
+        if !compiled.has_opacity {
+            return 1.0;
+        }
+        if let Some(&opacity) = known.get(&material) {
+            return opacity;
+        }
+        let parts = &mut |part| self.opacity_once(part, at, known);
+        let opacity = self.opacity_of(&compiled.kind, at, parts);
+        known.insert(material, opacity);
+        opacity
+    }
+
+    /// The opacity of a material from that of those which it is made of.
+    fn opacity_of(&self, kind: &Kind, at: &TexturePoint, part: &mut impl FnMut(u32) -> f32) -> f32 {
+        match kind {
             Kind::Masked { material, opacity } => {
-                self.scalar(opacity, at).clamp(0.0, 1.0) * self.opacity(*material, at)
+                self.scalar(opacity, at).clamp(0.0, 1.0) * part(*material)
             }
             Kind::Mix { a, b, amount } => {
                 let amount = self.scalar(amount, at).clamp(0.0, 1.0);
-                (1.0 - amount) * self.opacity(*a, at) + amount * self.opacity(*b, at)
+                (1.0 - amount) * part(*a) + amount * part(*b)
             }
-            Kind::Relief { material } => self.opacity(*material, at),
+            Kind::Relief { material } => part(*material),
             _ => 1.0,
         }
+    }
+
+    /// Whether something is true of a material or of one that it is made of, asked of each once.
+    fn any_part(&self, material: u32, is_true: impl Fn(&Kind) -> bool) -> bool {
+        let mut open = vec![material];
+        let mut seen = HashSet::new();
+        while let Some(part) = open.pop() {
+            match &self.materials[part as usize].kind {
+                _ if !seen.insert(part) => {}
+                Kind::Mix { a, b, .. } => open.extend([*b, *a]),
+                Kind::Masked { material, .. } | Kind::Relief { material } => open.push(*material),
+                kind if is_true(kind) => return true,
+                _ => {}
+            }
+        }
+        false
     }
 
     /// Whether a surface stops a ray: `None` where it passes through a hole.
@@ -391,26 +415,19 @@ impl MaterialTable {
 
     /// Whether [`Bsdf::is_storable`] can be true of a point of the material.
     pub fn may_be_storable(&self, material: u32, min_alpha: f32) -> bool {
-        match &self.materials[material as usize].kind {
+        self.any_part(material, |kind| match kind {
             Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Principled { .. } => true,
-            Kind::Mirror { .. } | Kind::ThinGlass { .. } => false,
             Kind::Dielectric { width, .. } | Kind::Conductor { width, .. } => {
                 width.widest() >= min_alpha
             }
-            Kind::Mix { a, b, .. } => {
-                self.may_be_storable(*a, min_alpha) || self.may_be_storable(*b, min_alpha)
-            }
-            Kind::Masked { material, .. } | Kind::Relief { material } => {
-                self.may_be_storable(*material, min_alpha)
-            }
-        }
+            _ => false,
+        })
     }
 
     /// Whether the material can pass light on so sharply that it makes caustics: by a lobe without
     /// extent, or because it is not storable at some point.
     pub fn may_cast_caustics(&self, material: u32, min_alpha: f32) -> bool {
-        match &self.materials[material as usize].kind {
-            Kind::Diffuse { .. } => false,
+        self.any_part(material, |kind| match kind {
             Kind::Mirror { .. } | Kind::ThinGlass { .. } => true,
             Kind::Dielectric { width, .. } | Kind::Conductor { width, .. } => {
                 width.narrowest() < min_alpha
@@ -426,13 +443,8 @@ impl MaterialTable {
             }
             // The rough coat goes with its base, which is diffuse.
             Kind::Plastic { width, .. } => width.narrowest() == 0.0,
-            Kind::Mix { a, b, .. } => {
-                self.may_cast_caustics(*a, min_alpha) || self.may_cast_caustics(*b, min_alpha)
-            }
-            Kind::Masked { material, .. } | Kind::Relief { material } => {
-                self.may_cast_caustics(*material, min_alpha)
-            }
-        }
+            _ => false,
+        })
     }
 
     /// Number of materials.

@@ -191,9 +191,29 @@ fn conductors_take_any_of_their_three_forms() {
 fn cycles_of_materials_are_found() {
     let mask = |material| Material::Masked { material, opacity: 0.5.into() };
     let mix = |a, b| Material::Mix { a, b, amount: 0.5.into() };
-    assert_eq!(material_cycle(&[diffuse(0.5), mix(0, 0), mask(1), mix(1, 2)]), None);
-    assert_eq!(material_cycle(&[mask(0)]), Some(0));
-    assert_eq!(material_cycle(&[diffuse(0.5), mix(0, 2), mask(1)]), Some(1));
+    assert_eq!(
+        material_order(&[diffuse(0.5), mix(0, 0), mask(1), mix(1, 2)]),
+        Ok(vec![0, 1, 2, 3])
+    );
+    assert_eq!(material_order(&[mask(0)]), Err(GraphFault::Cycle(0)));
+    assert_eq!(material_order(&[diffuse(0.5), mix(0, 2), mask(1)]), Err(GraphFault::Cycle(1)));
+}
+
+/// Closed form: 60 mixes, both sides of each the next one, are as opaque as the last; asking all ways would take 2^60.
+#[test]
+fn a_material_that_many_ways_lead_to_is_asked_once() {
+    let last = 60;
+    let mut materials: Vec<_> = (0..last)
+        .map(|k| Material::Mix { a: k + 1, b: k + 1, amount: Value::Constant(0.5) })
+        .collect();
+    materials.push(Material::Masked { material: last + 1, opacity: 0.25.into() });
+    materials.push(diffuse(0.5));
+    let table = MaterialTable::new(&materials, Textures::default());
+    assert_eq!(table.opacity(0, &HERE), 0.25);
+    assert!(table.may_be_storable(0, 0.1) && !table.may_cast_caustics(0, 0.1));
+    assert!(table.caustic_lobes(0, 0.1).is_empty());
+    assert!(!table.disperses(0) && !table.has_spectrum(0) && table.interior(0).is_none());
+    assert_eq!(table.choose(0, &HERE, &mut 0.3).material, last + 1);
 }
 
 #[test]

@@ -8,6 +8,7 @@
 mod domain;
 mod grid;
 mod image;
+mod memory;
 mod moments;
 mod pattern;
 mod point;
@@ -16,6 +17,7 @@ mod range;
 mod solid;
 
 pub use domain::Domain;
+pub(super) use memory::{Known, REMEMBER_ABOVE};
 pub use moments::Moments;
 pub use point::TexturePoint;
 pub use pyramid::Pyramid;
@@ -25,7 +27,9 @@ use crate::color::luminance;
 use crate::color::spectrum::{WavelengthSet, color_of};
 use crate::description::{Falloff, GridData, ImageData, Rgb, Texture, TextureFiltering, Value};
 use crate::math::Chart;
+use crate::math::parts_first;
 use glam::{DMat2, DVec2, Vec2, Vec3, Vec4};
+use memory::{Forgetful, Memory, Remembering};
 use pattern::Wall;
 use solid::Octaves;
 use std::collections::{HashMap, HashSet};
@@ -44,6 +48,8 @@ trait Sample:
     fn of_color(color: Rgb) -> Self;
     fn of_texel(texel: Vec4, channel: crate::description::Channel) -> Self;
     fn each(self, f: impl Fn(f32) -> f32) -> Self;
+    fn known(memory: &Remembering) -> &Known<Self>;
+    fn known_mut(memory: &mut Remembering) -> &mut Known<Self>;
 }
 
 impl Sample for Rgb {
@@ -58,6 +64,14 @@ impl Sample for Rgb {
     fn each(self, f: impl Fn(f32) -> f32) -> Self {
         self.map(f)
     }
+
+    fn known(memory: &Remembering) -> &Known<Self> {
+        &memory.colors
+    }
+
+    fn known_mut(memory: &mut Remembering) -> &mut Known<Self> {
+        &mut memory.colors
+    }
 }
 
 impl Sample for f32 {
@@ -71,6 +85,14 @@ impl Sample for f32 {
 
     fn each(self, f: impl Fn(f32) -> f32) -> Self {
         f(self)
+    }
+
+    fn known(memory: &Remembering) -> &Known<Self> {
+        &memory.numbers
+    }
+
+    fn known_mut(memory: &mut Remembering) -> &mut Known<Self> {
+        &mut memory.numbers
     }
 }
 
@@ -101,11 +123,23 @@ impl TextureNeeds {
 #[derive(Clone, Debug, Default)]
 pub struct Textures {
     list: Vec<RenderTexture>,
+    /// What each texture takes together with those that it refers to.
+    whole: Vec<Whole>,
     filtering: TextureFiltering,
     /// Opening and closing of the shutter, seconds.
     shutter: (f64, f64),
     /// What stands in for red, green and blue, in a spectral scene.
     seen: Option<Seen>,
+}
+
+/// What a texture takes together with all that it refers to.
+#[derive(Clone, Copy, Debug)]
+struct Whole {
+    needs: TextureNeeds,
+    /// Places of the unit square that it tells apart.
+    resolution: (u32, u32),
+    /// How many lookups one would take that forgets what it has found.
+    lookups: u64,
 }
 
 /// Textures at the wavelengths of a set.
@@ -121,7 +155,7 @@ impl Textures {
     /// `filtering` needs none; those in `known` are used again.
     ///
     /// # Panics
-    /// If a reference is out of range.
+    /// If a reference is out of range, or a texture is made of itself or of too many in a row.
     pub fn new(
         list: Vec<Texture<Arc<ImageData>, Arc<GridData>, u32>>,
         filtering: TextureFiltering,
@@ -130,7 +164,7 @@ impl Textures {
         let count = list.len() as u32;
         let levels = filtering != TextureFiltering::Point;
         let mut made = Pyramids::default();
-        let list = list
+        let list: Vec<RenderTexture> = list
             .into_iter()
             .map(|texture| {
                 let mut image = |image: Arc<ImageData>, _| {
@@ -149,7 +183,8 @@ impl Textures {
                 }
             })
             .collect();
-        Self { list, filtering, shutter: (0.0, 0.0), seen: None }
+        let whole = whole(&list, filtering);
+        Self { list, whole, filtering, shutter: (0.0, 0.0), seen: None }
     }
 
     /// The same at the time of a frame: when its shutter opens and closes, in seconds.
@@ -195,23 +230,7 @@ impl Textures {
 
     /// What a texture, or one that it refers to, needs to know of a point beside uv.
     pub fn needs(&self, index: u32) -> TextureNeeds {
-        let texture = &self.list[index as usize];
-        let place = matches!(
-            texture,
-            Texture::Noise { .. }
-                | Texture::Cells { .. }
-                | Texture::Marble { .. }
-                | Texture::Wood { .. }
-                | Texture::Ramp { .. }
-                | Texture::Radial { .. }
-                | Texture::Grid { .. }
-                | Texture::Drift { .. }
-                | Texture::Triplanar { .. }
-                | Texture::VertexColor {}
-        );
-        let footprint = self.filtering != TextureFiltering::Point;
-        let own = TextureNeeds { place, footprint, tangents: false };
-        texture.refs().fold(own, |sum, (_, part)| sum.and(self.needs(*part)))
+        self.whole[index as usize].needs
     }
 
     /// The colour of a texture at a point; seen at wavelengths, its values there.
@@ -227,7 +246,7 @@ impl Textures {
     /// The three numbers which a texture holds at a point, whatever they mean.
     #[inline]
     pub fn vector(&self, index: u32, at: &TexturePoint) -> Vec3 {
-        self.sample(index, at)
+        self.look_up(index, at)
     }
 
     /// Whether a texture is a spectrum.
@@ -250,25 +269,13 @@ impl Textures {
     /// pattern.
     #[inline]
     pub fn scalar(&self, index: u32, at: &TexturePoint) -> f32 {
-        self.sample(index, at)
+        self.look_up(index, at)
     }
 
     /// How many places of the unit square a texture tells apart: the most of all images that it is made of.
     /// Patterns and solid textures count as fine enough for any that a picture can show.
     pub fn resolution(&self, index: u32) -> (u32, u32) {
-        let texture = &self.list[index as usize];
-        let own = match texture {
-            Texture::Image { file, .. } => (file.base.width, file.base.height),
-            Texture::Mix { .. }
-            | Texture::Multiply { .. }
-            | Texture::Remap { .. }
-            | Texture::Drift { .. } => (1, 1),
-            _ => (1024, 512),
-        };
-        texture.refs().fold(own, |(width, height), (_, part)| {
-            let (w, h) = self.resolution(*part);
-            (width.max(w), height.max(h))
-        })
+        self.whole[index as usize].resolution
     }
 
     /// How many textures there are.
@@ -318,21 +325,41 @@ impl Textures {
         sum / (N * N) as f32
     }
 
-    fn value<T: Sample>(&self, value: &Value<Rgb, u32>, at: &TexturePoint) -> T {
+    #[inline]
+    fn look_up<T: Sample>(&self, index: u32, at: &TexturePoint) -> T {
+        if self.whole[index as usize].lookups <= REMEMBER_ABOVE {
+            self.sample(index, at, &mut Forgetful)
+        } else {
+            self.sample(index, at, &mut Remembering::default())
+        }
+    }
+
+    fn value<T: Sample>(
+        &self,
+        value: &Value<Rgb, u32>,
+        at: &TexturePoint,
+        memory: &mut impl Memory,
+    ) -> T {
         match *value {
             Value::Constant(color) => T::of_color(color),
-            Value::Texture(index) => self.sample(index, at),
+            Value::Texture(index) => self.sample(index, at, memory),
         }
     }
 
     /// `(1 − share)·a + share·b`; what has no share is not looked up.
-    fn mix<T: Sample>(&self, [a, b]: [&Value<Rgb, u32>; 2], share: f32, at: &TexturePoint) -> T {
+    fn mix<T: Sample>(
+        &self,
+        [a, b]: [&Value<Rgb, u32>; 2],
+        share: f32,
+        at: &TexturePoint,
+        memory: &mut impl Memory,
+    ) -> T {
         if share == 0.0 {
-            self.value(a, at)
+            self.value(a, at, memory)
         } else if share == 1.0 {
-            self.value(b, at)
+            self.value(b, at, memory)
         } else {
-            self.value::<T>(a, at) * (1.0 - share) + self.value::<T>(b, at) * share
+            self.value::<T>(a, at, memory) * (1.0 - share) + self.value::<T>(b, at, memory) * share
         }
     }
 
@@ -343,19 +370,31 @@ impl Textures {
         share: f64,
         falloff: Falloff,
         at: &TexturePoint,
+        memory: &mut impl Memory,
     ) -> T {
         let share = share.clamp(0.0, 1.0);
         match falloff {
-            Falloff::Linear => self.mix([a, b], share as f32, at),
-            Falloff::Smooth => self.mix([a, b], pattern::smooth(share), at),
+            Falloff::Linear => self.mix([a, b], share as f32, at, memory),
+            Falloff::Smooth => self.mix([a, b], pattern::smooth(share), at, memory),
             Falloff::Exponential => {
-                let (a, b): (T, T) = (self.value(a, at), self.value(b, at));
+                let (a, b): (T, T) = (self.value(a, at, memory), self.value(b, at, memory));
                 a.each(|a| a.powf((1.0 - share) as f32)) * b.each(|b| b.powf(share as f32))
             }
         }
     }
 
-    fn sample<T: Sample>(&self, index: u32, at: &TexturePoint) -> T {
+    fn sample<T: Sample, M: Memory>(&self, index: u32, at: &TexturePoint, memory: &mut M) -> T {
+        if let Some(value) = memory.recall(index) {
+            return value;
+        }
+        let value = self.found(index, at, memory);
+        memory.keep(index, value);
+        value
+    }
+
+    /// What a texture is at a point where that is not known yet.
+    #[inline]
+    fn found<T: Sample, M: Memory>(&self, index: u32, at: &TexturePoint, memory: &mut M) -> T {
         match &self.list[index as usize] {
             Texture::Image { file, wrap, filter, repeat, offset, channel, .. } => {
                 let domain =
@@ -367,13 +406,15 @@ impl Textures {
                 let axes = at.axes.map(|axis| axis * *repeat);
                 T::of_texel(look.filtered(file, uv, axes), *channel)
             }
-            Texture::Checker { size, a, b } => self.mix([a, b], pattern::checker(at, *size), at),
+            Texture::Checker { size, a, b } => {
+                self.mix([a, b], pattern::checker(at, *size), at, memory)
+            }
             Texture::Stripes { size, share, a, b } => {
-                self.mix([a, b], pattern::stripes(at, *size, *share), at)
+                self.mix([a, b], pattern::stripes(at, *size, *share), at, memory)
             }
             Texture::Gradient { a, b } => {
                 let share = if at.uv.x.is_nan() { 0.0 } else { at.uv.x.clamp(0.0, 1.0) };
-                self.mix([a, b], share, at)
+                self.mix([a, b], share, at, memory)
             }
             Texture::Bricks { size, mortar, bevel, shift, period, seed, a, b, between } => {
                 let wall = Wall {
@@ -386,36 +427,39 @@ impl Textures {
                 };
                 let brick = wall.at(at);
                 if brick.solid == 0.0 {
-                    return self.value(between, at);
+                    return self.value(between, at, memory);
                 }
-                let face: T = self.mix([a, b], brick.number, at);
+                let face: T = self.mix([a, b], brick.number, at, memory);
                 if brick.solid == 1.0 {
                     return face;
                 }
-                face * brick.solid + self.value::<T>(between, at) * (1.0 - brick.solid)
+                face * brick.solid + self.value::<T>(between, at, memory) * (1.0 - brick.solid)
             }
             Texture::Noise { size, octaves, gain, turbulence, seed, a, b } => {
                 let octaves =
                     Octaves { count: *octaves, gain: *gain, turbulence: *turbulence, seed: *seed };
-                self.mix([a, b], solid::noise(at, *size, &octaves), at)
+                self.mix([a, b], solid::noise(at, *size, &octaves), at, memory)
             }
             Texture::Cells { size, shows, jitter, seed, a, b } => {
-                self.mix([a, b], solid::cells(at, *size, *shows, *jitter, *seed), at)
+                self.mix([a, b], solid::cells(at, *size, *shows, *jitter, *seed), at, memory)
             }
-            Texture::Marble { size, distortion, sharpness, seed, a, b } => {
-                self.mix([a, b], solid::marble(at, *size, *distortion, *sharpness, *seed), at)
-            }
+            Texture::Marble { size, distortion, sharpness, seed, a, b } => self.mix(
+                [a, b],
+                solid::marble(at, *size, *distortion, *sharpness, *seed),
+                at,
+                memory,
+            ),
             Texture::Wood { size, distortion, grain, seed, a, b } => {
-                self.mix([a, b], solid::wood(at, *size, *distortion, *grain, *seed), at)
+                self.mix([a, b], solid::wood(at, *size, *distortion, *grain, *seed), at, memory)
             }
             Texture::Ramp { from, to, falloff, a, b } => {
                 let (from, way) = (from.as_dvec3(), (*to - *from).as_dvec3());
                 let share = (at.p - from).dot(way) / way.length_squared();
-                self.fall([a, b], share, *falloff, at)
+                self.fall([a, b], share, *falloff, at, memory)
             }
             Texture::Radial { centre, radius, falloff, a, b } => {
                 let share = at.p.distance(centre.as_dvec3()) / f64::from(*radius);
-                self.fall([a, b], share, *falloff, at)
+                self.fall([a, b], share, *falloff, at, memory)
             }
             Texture::Grid { file, size, centre } => {
                 T::of_color(grid::Placed::new(file, *size, *centre).at(at.p))
@@ -423,25 +467,28 @@ impl Textures {
             Texture::Drift { of, velocity } => {
                 let (open, close) = self.shutter;
                 let seconds = open + (close - open) * f64::from(at.time);
-                self.sample(*of, &at.moved(velocity.as_dvec3() * -seconds))
+                let at = at.moved(velocity.as_dvec3() * -seconds);
+                self.sample(*of, &at, &mut M::elsewhere())
             }
             Texture::Mix { a, b, amount } => {
                 let amount = match *amount {
                     Value::Constant(amount) => amount,
-                    Value::Texture(index) => self.scalar(index, at),
+                    Value::Texture(index) => self.sample(index, at, memory),
                 };
-                self.mix([a, b], amount.clamp(0.0, 1.0), at)
+                self.mix([a, b], amount.clamp(0.0, 1.0), at, memory)
             }
-            Texture::Multiply { a, b } => self.value::<T>(a, at) * self.value::<T>(b, at),
+            Texture::Multiply { a, b } => {
+                self.value::<T>(a, at, memory) * self.value::<T>(b, at, memory)
+            }
             Texture::Remap { of, from, to, smooth } => {
-                self.sample::<T>(*of, at).each(|value| remap(value, *from, *to, *smooth))
+                self.sample::<T, M>(*of, at, memory).each(|value| remap(value, *from, *to, *smooth))
             }
             Texture::Placed { of, repeat, rotation, offset } => {
                 let m = domain::turn(*rotation) * DMat2::from_diagonal(repeat.as_dvec2());
-                self.sample(*of, &at.placed(m, offset.as_dvec2()))
+                self.sample(*of, &at.placed(m, offset.as_dvec2()), &mut M::elsewhere())
             }
             Texture::Triplanar { of, size, sharpness } => {
-                self.triplanar(*of, *size, *sharpness, at)
+                self.triplanar::<T, M>(*of, *size, *sharpness, at)
             }
             Texture::Spectrum { values, scale } => T::of_color(color_of(values) * *scale),
             Texture::VertexColor {} => T::of_color(at.color),
@@ -449,7 +496,13 @@ impl Textures {
     }
 
     /// The texture seen along each axis, weighted by how much the surface faces it.
-    fn triplanar<T: Sample>(&self, of: u32, size: f32, sharpness: f32, at: &TexturePoint) -> T {
+    fn triplanar<T: Sample, M: Memory>(
+        &self,
+        of: u32,
+        size: f32,
+        sharpness: f32,
+        at: &TexturePoint,
+    ) -> T {
         let weights = at.n.abs().map(|n| n.powf(sharpness));
         let weights = weights / weights.element_sum();
         let p = at.p / f64::from(size);
@@ -459,7 +512,7 @@ impl Textures {
         let seen = |side: usize| {
             let (uv, domain) = (sides[side].as_vec2(), Domain::new(Chart::ENDLESS));
             let at = TexturePoint { uv, domain, axes, ..*at };
-            self.sample::<T>(of, &at) * weights[side]
+            self.sample::<T, M>(of, &at, &mut M::elsewhere()) * weights[side]
         };
         let mut sum = T::of_color(Vec3::ZERO);
         for side in 0..3 {
@@ -469,6 +522,55 @@ impl Textures {
         }
         sum
     }
+}
+
+/// [`Whole`] of each texture, asked in an order in which its parts come first.
+fn whole(list: &[RenderTexture], filtering: TextureFiltering) -> Vec<Whole> {
+    let parts = |index: u32| list[index as usize].refs().map(|(_, part)| *part).collect();
+    let order = parts_first(list.len() as u32, parts);
+    let order = order.expect("the description rejects what has no order");
+    let none = Whole { needs: TextureNeeds::default(), resolution: (1, 1), lookups: 1 };
+    let mut all = vec![none; list.len()];
+    for index in order {
+        let texture = &list[index as usize];
+        let footprint = filtering != TextureFiltering::Point;
+        let needs = TextureNeeds { place: needs_place(texture), footprint, tangents: false };
+        let resolution = match texture {
+            Texture::Image { file, .. } => (file.base.width, file.base.height),
+            Texture::Mix { .. }
+            | Texture::Multiply { .. }
+            | Texture::Remap { .. }
+            | Texture::Drift { .. } => (1, 1),
+            _ => (1024, 512),
+        };
+        let mut own = Whole { needs, resolution, lookups: 1 };
+        for (_, part) in texture.refs() {
+            let part = all[*part as usize];
+            own.needs = own.needs.and(part.needs);
+            own.resolution.0 = own.resolution.0.max(part.resolution.0);
+            own.resolution.1 = own.resolution.1.max(part.resolution.1);
+            own.lookups = own.lookups.saturating_add(part.lookups);
+        }
+        all[index as usize] = own;
+    }
+    all
+}
+
+/// Whether a texture by itself looks at more than uv.
+fn needs_place(texture: &RenderTexture) -> bool {
+    matches!(
+        texture,
+        Texture::Noise { .. }
+            | Texture::Cells { .. }
+            | Texture::Marble { .. }
+            | Texture::Wood { .. }
+            | Texture::Ramp { .. }
+            | Texture::Radial { .. }
+            | Texture::Grid { .. }
+            | Texture::Drift { .. }
+            | Texture::Triplanar { .. }
+            | Texture::VertexColor {}
+    )
 }
 
 /// A value of one range as one of another; beyond the ends it stays there.

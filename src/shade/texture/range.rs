@@ -4,12 +4,12 @@
 //! steep it can be; of patterns the bounds are those of their colours.
 
 use super::solid::{self, Octaves};
-use super::{TexturePoint, Textures, domain, grid, image, pattern, remap};
+use super::{Known, TexturePoint, Textures, domain, grid, image, pattern, remap};
 use crate::color::luminance;
 use crate::color::spectrum::color_of;
 use crate::description::{CellFeature, Falloff, Rgb, Texture, Value};
 use glam::{DMat2, DVec2, DVec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// A region inside a solid, metres in the space of the object.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,11 @@ impl<'a> Ranges<'a> {
     /// Bounds of a texture and those that it is made of.
     pub fn new(textures: &'a Textures, root: u32) -> Self {
         let (mut images, mut open) = (HashMap::new(), vec![root]);
+        let mut seen = HashSet::new();
         while let Some(index) = open.pop() {
+            if !seen.insert(index) {
+                continue;
+            }
             let texture = &textures.list()[index as usize];
             open.extend(texture.refs().map(|(_, part)| *part));
             if let Texture::Image { file, channel, .. } = texture {
@@ -73,19 +77,30 @@ impl<'a> Ranges<'a> {
 
     /// Least and greatest number in a region over the shutter.
     pub fn over(&self, region: &Region) -> [f32; 2] {
-        self.of(self.root, region)
+        self.of(self.root, region, &mut Known::default())
     }
 
-    fn value(&self, value: &Value<Rgb, u32>, region: &Region) -> [f32; 2] {
+    fn value(
+        &self,
+        value: &Value<Rgb, u32>,
+        region: &Region,
+        known: &mut Known<[f32; 2]>,
+    ) -> [f32; 2] {
         match *value {
             Value::Constant(color) => [luminance(color); 2],
-            Value::Texture(index) => self.of(index, region),
+            Value::Texture(index) => self.of(index, region, known),
         }
     }
 
     /// Of `(1 − s)·a + s·b` with a share between two.
-    fn mix(&self, [a, b]: [&Value<Rgb, u32>; 2], share: [f32; 2], region: &Region) -> [f32; 2] {
-        let (a, b) = (self.value(a, region), self.value(b, region));
+    fn mix(
+        &self,
+        [a, b]: [&Value<Rgb, u32>; 2],
+        share: [f32; 2],
+        region: &Region,
+        known: &mut Known<[f32; 2]>,
+    ) -> [f32; 2] {
+        let (a, b) = (self.value(a, region, known), self.value(b, region, known));
         extremes(|corner| {
             let s = share[corner & 1];
             a[corner >> 1 & 1] * (1.0 - s) + b[corner >> 2 & 1] * s
@@ -98,13 +113,14 @@ impl<'a> Ranges<'a> {
         share: [f64; 2],
         falloff: Falloff,
         region: &Region,
+        known: &mut Known<[f32; 2]>,
     ) -> [f32; 2] {
         let share = share.map(|share| share.clamp(0.0, 1.0));
         match falloff {
-            Falloff::Linear => self.mix([a, b], share.map(|s| s as f32), region),
-            Falloff::Smooth => self.mix([a, b], share.map(pattern::smooth), region),
+            Falloff::Linear => self.mix([a, b], share.map(|s| s as f32), region, known),
+            Falloff::Smooth => self.mix([a, b], share.map(pattern::smooth), region, known),
             Falloff::Exponential => {
-                let (a, b) = (self.value(a, region), self.value(b, region));
+                let (a, b) = (self.value(a, region, known), self.value(b, region, known));
                 extremes(|corner| {
                     let s = share[corner & 1];
                     a[corner >> 1 & 1].powf((1.0 - s) as f32) * b[corner >> 2 & 1].powf(s as f32)
@@ -113,20 +129,30 @@ impl<'a> Ranges<'a> {
         }
     }
 
-    fn of(&self, index: u32, region: &Region) -> [f32; 2] {
+    /// Each texture is asked once in a region: `known` holds what was found.
+    fn of(&self, index: u32, region: &Region, known: &mut Known<[f32; 2]>) -> [f32; 2] {
+        if let Some(&range) = known.get(&index) {
+            return range;
+        }
+        let range = self.found(index, region, known);
+        known.insert(index, range);
+        range
+    }
+
+    fn found(&self, index: u32, region: &Region, known: &mut Known<[f32; 2]>) -> [f32; 2] {
         const ANY: [f32; 2] = [0.0, 1.0];
         match &self.textures.list()[index as usize] {
             Texture::Image { .. } => self.images[&index],
             Texture::Checker { a, b, .. }
             | Texture::Stripes { a, b, .. }
             | Texture::Marble { a, b, .. }
-            | Texture::Wood { a, b, .. } => self.mix([a, b], ANY, region),
+            | Texture::Wood { a, b, .. } => self.mix([a, b], ANY, region, known),
             Texture::Bricks { a, b, between, .. } => {
-                hull(self.mix([a, b], ANY, region), self.value(between, region))
+                hull(self.mix([a, b], ANY, region, known), self.value(between, region, known))
             }
             Texture::Gradient { a, b } => {
                 let share = region.uv.map(|uv| uv.x.clamp(0.0, 1.0) as f32);
-                self.mix([a, b], share, region)
+                self.mix([a, b], share, region, known)
             }
             Texture::Noise { size, octaves, gain, turbulence, seed, a, b } => {
                 let octaves =
@@ -137,7 +163,7 @@ impl<'a> Ranges<'a> {
                     let s = if *turbulence { s } else { 0.5 + 0.5 * s };
                     s.clamp(0.0, 1.0)
                 });
-                self.mix([a, b], share, region)
+                self.mix([a, b], share, region, known)
             }
             Texture::Cells { size, shows, jitter, seed, a, b } => {
                 // Distances to points change by no more than one goes, differences of two by twice that.
@@ -155,21 +181,21 @@ impl<'a> Ranges<'a> {
                 } else {
                     ANY
                 };
-                self.mix([a, b], share, region)
+                self.mix([a, b], share, region, known)
             }
             Texture::Ramp { from, to, falloff, a, b } => {
                 let way = (*to - *from).as_dvec3();
                 let share = |p: DVec3| (p - from.as_dvec3()).dot(way) / way.length_squared();
                 let reach = region.half_size().dot(way.abs()) / way.length_squared();
                 let middle = share(region.middle());
-                self.fall([a, b], [middle - reach, middle + reach], *falloff, region)
+                self.fall([a, b], [middle - reach, middle + reach], *falloff, region, known)
             }
             Texture::Radial { centre, radius, falloff, a, b } => {
                 let (centre, radius) = (centre.as_dvec3(), f64::from(*radius));
                 let near = centre.clamp(region.p[0], region.p[1]).distance(centre);
                 let offset = (region.middle() - centre).abs() + region.half_size();
                 let share = [near / radius, offset.length() / radius];
-                self.fall([a, b], share, *falloff, region)
+                self.fall([a, b], share, *falloff, region, known)
             }
             Texture::Grid { file, size, centre } => {
                 grid::Placed::new(file, *size, *centre).range(region.p[0], region.p[1])
@@ -177,21 +203,21 @@ impl<'a> Ranges<'a> {
             Texture::Drift { of, velocity } => {
                 let (open, close) = self.textures.shutter;
                 let by = [open, close].map(|seconds| velocity.as_dvec3() * -seconds);
-                self.of(*of, &region.swept(by))
+                self.of(*of, &region.swept(by), &mut Known::default())
             }
             Texture::Mix { a, b, amount } => {
                 let share = match *amount {
                     Value::Constant(amount) => [amount; 2],
-                    Value::Texture(index) => self.of(index, region),
+                    Value::Texture(index) => self.of(index, region, known),
                 };
-                self.mix([a, b], share.map(|s| s.clamp(0.0, 1.0)), region)
+                self.mix([a, b], share.map(|s| s.clamp(0.0, 1.0)), region, known)
             }
             Texture::Multiply { a, b } => {
-                let (a, b) = (self.value(a, region), self.value(b, region));
+                let (a, b) = (self.value(a, region, known), self.value(b, region, known));
                 extremes(|corner| a[corner & 1] * b[corner >> 1 & 1])
             }
             Texture::Remap { of, from, to, smooth } => {
-                let ends = self.of(*of, region).map(|end| remap(end, *from, *to, *smooth));
+                let ends = self.of(*of, region, known).map(|end| remap(end, *from, *to, *smooth));
                 hull([ends[0]; 2], [ends[1]; 2])
             }
             Texture::Placed { of, repeat, rotation, offset } => {
@@ -200,12 +226,16 @@ impl<'a> Ranges<'a> {
                 let middle = m * (0.5 * (region.uv[0] + region.uv[1])) + offset.as_dvec2();
                 let half = 0.5 * (region.uv[1] - region.uv[0]);
                 let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y;
-                self.of(*of, &region.with_uv([middle - reach, middle + reach]))
+                self.of(
+                    *of,
+                    &region.with_uv([middle - reach, middle + reach]),
+                    &mut Known::default(),
+                )
             }
             Texture::Triplanar { of, size, .. } => {
                 // There are no surfaces inside: it is seen along z.
                 let uv = region.p.map(|p| p.truncate() / f64::from(*size));
-                self.of(*of, &region.with_uv(uv))
+                self.of(*of, &region.with_uv(uv), &mut Known::default())
             }
             Texture::Spectrum { values, scale } => [luminance(color_of(values) * *scale); 2],
             Texture::VertexColor {} => [1.0; 2],

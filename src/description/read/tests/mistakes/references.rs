@@ -179,3 +179,60 @@ fn names_given_twice_are_told_with_both_places() {
       |  first given here
     "#);
 }
+
+/// A chain of so many that reading it by recursion would end the program, for every kind that is made of others.
+#[test]
+fn long_chains_are_refused_where_they_are_too_deep() {
+    let count = 30_000;
+    let chain = |of: &dyn Fn(usize) -> String, last: &str| -> String {
+        let links = (0..count).map(|k| format!("\"a{k}\": {},\n", of(k + 1)));
+        links.collect::<String>() + &format!("\"a{count}\": {last}")
+    };
+    let first = count - 128;
+    for (part, text) in [
+        ("texture", chain(&|k| format!("Placed(of: \"a{k}\")"), "Gradient()")),
+        ("texture", chain(&|k| format!("Mix(b: \"a{k}\")"), "Gradient()")),
+        ("material", chain(&|k| format!("Masked(material: \"a{k}\", opacity: 1)"), "Diffuse()")),
+        (
+            "mesh",
+            chain(
+                &|k| format!("Subdivided(of: \"a{k}\", levels: 0)"),
+                "Grid(size: (1, 1), cells: (1, 1))",
+            ),
+        ),
+    ] {
+        let plural = if part == "mesh" { "meshes".to_owned() } else { format!("{part}s") };
+        let told = with_settings(&with_part(&format!("{plural}: {{{text}}}")), &[]);
+        let told = told.expect_err("it is too deep").to_string();
+        let expected = format!("the {part} `a{first}` is made of more than 128 others in a row");
+        assert!(told.contains(&expected), "{told}");
+    }
+    // Parents are followed without recursion.
+    let parents = chain(&|k| format!("(parent: \"a{k}\")"), "()");
+    let scene = scene(&format!("(entities: {{\"cam\": (camera: ()), {parents}}})"));
+    assert_eq!(scene.entities.len(), count + 2);
+}
+
+/// Sixty levels, on each of which both parts are the next one, are read at once; sixty of two that look elsewhere are refused.
+#[test]
+fn graphs_are_read_in_linear_time() {
+    let levels = |of: &dyn Fn(usize) -> String, last: &str| -> String {
+        (0..60).map(|k| of(k) + ",\n").collect::<String>() + last
+    };
+    let both = |k: usize| format!("\"t{k}\": Multiply(a: \"t{0}\", b: \"t{0}\")", k + 1);
+    let mixed = |k: usize| format!("\"m{k}\": Mix(a: \"m{0}\", b: \"m{0}\", amount: 0.5)", k + 1);
+    let textures = levels(&both, "\"t60\": Gradient()");
+    let materials = levels(&mixed, "\"m60\": Diffuse(albedo: \"t0\")");
+    let text = with_part(&format!("textures: {{{textures}}}, materials: {{{materials}}}"));
+    assert_eq!(scene(&text).textures.len(), 61);
+    let moved = |k: usize| {
+        let next = k + 1;
+        format!(
+            "\"t{k}\": Multiply(a: \"p{k}\", b: \"q{k}\"), \"p{k}\": Placed(of: \"t{next}\"), \
+             \"q{k}\": Placed(of: \"t{next}\", repeat: (2, 1))"
+        )
+    };
+    let textures = levels(&moved, "\"t60\": Gradient()");
+    let told = mistakes(&with_part(&format!("textures: {{{textures}}}")));
+    assert!(told.contains("looks up more than 65536 others for every point"), "{told}");
+}

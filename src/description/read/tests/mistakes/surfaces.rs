@@ -80,7 +80,7 @@ fn wrong_textures_and_meshes_made_of_others_are_told() {
         ),
         (
             r#"meshes: {"s": Subdivided(of: "s", levels: 3)}"#,
-            &["the mesh `s` is made from itself", "meshes.s.Subdivided.of"][..],
+            &["the mesh `s` is made of itself", "meshes.s.Subdivided.of"][..],
         ),
         (
             r#"meshes: {"g": Grid(size: (1, 1), cells: (2, 2)), "big": Subdivided(of: "g", levels: 40)}"#,

@@ -112,7 +112,7 @@ fn a_wrong_type_is_told_with_what_was_expected() {
       |                                   ^^^^^^ materials.it.Diffuse.albedo
     "#);
     insta::assert_snapshot!(mistakes(&with_entity("transform: (translation: (1, 2))")), @r#"
-    error[scene::wrong-type]: expected a sequence of 3 f64 values, found 2 values
+    error[scene::wrong-type]: expected three numbers `(x, y, z)`, found `(1, 2)`
      --> scene.ron:2:33
       |
     2 | "it": (transform: (translation: (1, 2)))})
@@ -159,6 +159,117 @@ fn a_wrong_type_is_told_with_what_was_expected() {
     2 | "it": (light: Spot(angle: 3))})
       |               ^^^^^^^^^^^^^^ entities.it.light
     "#);
+}
+
+/// What is told of a text: where, what, and what to do.
+fn told(text: &str) -> String {
+    let mistakes = with_settings(text, &[]).expect_err("it is wrong");
+    let told = |mistake: &Diagnostic| {
+        let help = mistake.help.as_deref().unwrap_or_default();
+        format!("{mistake} [{help}]")
+    };
+    mistakes.0.iter().map(told).collect::<Vec<_>>().join("\n")
+}
+
+/// Each text is what somebody writes who does not know the format yet.
+#[test]
+fn what_to_write_instead_is_told() {
+    for (entity, column, expected) in [
+        ("shape: Sphere(1)", 22, "[write `Sphere(radius: 1)`]"),
+        ("shape: Box(1, 1, 1)", 19, "[write `Box(size: (1, 1, 1))`]"),
+        ("shape: Cylinder(1, 2)", 24, "[write `Cylinder(radius: 1, height: 2)`]"),
+        ("shape: Plane", 15, "[write `Plane()`]"),
+        ("shape: Sphere", 15, "[write `Sphere()`]"),
+        ("shape: Plane(5)", 21, "[write `Plane()`]"),
+        ("shape: \"sphere\"", 15, "[write `Sphere(…)`, without quotes]"),
+        ("shape: Cube()", 15, "[here that is `Box(size: (1, 1, 1))`]"),
+        ("shape: Mesh(rabbit)", 20, "[write `\"rabbit\"`]"),
+        (
+            "velocity: (angular: 90)",
+            28,
+            "three numbers `(x, y, z)`, found `90` [write all of them, as in `(0, 90, 0)`]",
+        ),
+        ("velocity: (1, 0, 0)", 19, "[write `(linear: (1, 0, 0))`]"),
+        ("transform: (0, 1, 0)", 20, "[write `(translation: (0, 1, 0))`]"),
+        ("transform: (position: (0, 1, 0))", 20, "[here that is `translation`]"),
+        ("transform: (rotation: 90)", 30, "as in `(0, 90, 0)`"),
+        ("position: (0, 1, 0)", 8, "[here that is `transform: (translation: (x, y, z))`]"),
+        ("shape: Sphere(), emission: 5", 35, "[write `Radiance(5)`]"),
+        ("light: Sun()", 15, "`Directional(irradiance: …, angle: 0.53)`"),
+        ("light: Point(10)", 21, "[write `Point(intensity: 10)`]"),
+        ("hidden_from_camera: maybe", 28, "expected `true` or `false`, found `maybe`"),
+    ] {
+        let told = told(&with_entity(entity));
+        assert!(
+            told.contains(&format!("scene.ron:2:{column}: ")) && told.contains(expected),
+            "{entity}: {told}"
+        );
+    }
+    for (material, column, expected) in [
+        ("Glass(ior: 1.5)", 19, "[here that is `Dielectric(ior: 1.5)`"),
+        ("Lambert()", 19, "`Diffuse(albedo: …)`"),
+        ("Metal()", 19, "`Conductor(metal: Gold, roughness: 0.1)`"),
+        ("Emissive(1)", 19, "`emission: Radiance(…)`"),
+        ("Translucent()", 19, "`scattering`"),
+        ("Diffuse(color: (1, 0, 0))", 27, "[here that is `albedo`]"),
+        ("Diffuse(0.5)", 27, "[write `Diffuse(albedo: 0.5)`]"),
+        ("Plastic(roughness: 0,2)", 40, "[write `Plastic(roughness: 0.2)`]"),
+        ("Conductor(Gold)", 29, "[write `Conductor(metal: Gold)`]"),
+        ("Conductor(metal: \"Gold\")", 36, "[write `Gold`, without quotes]"),
+        ("Dielectric(attenuation: (0.5, 0.9, 0.9))", 44, "[write `(color: (0.5, 0.9, 0.9))`]"),
+    ] {
+        let told = told(&with_material(material));
+        assert!(
+            told.contains(&format!("scene.ron:2:{column}: ")) && told.contains(expected),
+            "{material}: {told}"
+        );
+    }
+    for (part, column, expected) in [
+        (
+            "profiles: {\"p\": Bezier([(0, 0), (1, 1)])}",
+            24,
+            "[write `Bezier(points: [(0, 0), (1, 1)])`]",
+        ),
+        ("textures: {\"t\": Image(\"a.png\")}", 23, "[write `Image(file: \"a.png\")`]"),
+        ("meshes: {\"m\": \"a.obj\"}", 15, "[write `File(\"a.obj\")`]"),
+        ("render: (size: 640)", 16, "two numbers"),
+        ("render: (samples: 1.5)", 19, "expected a whole number, found `1.5`"),
+        ("render: (samples: \"64\")", 19, "expected a whole number, found `\"64\"` [write `64`]"),
+        ("render: (width: 640)", 10, "[here that is `size: (width, height)`]"),
+        ("lights: {}", 1, "an entity with a `light`"),
+        ("camera: (position: (0, 0, 5))", 9, "[a camera is an entity: "),
+    ] {
+        let told = told(&with_part(part));
+        assert!(
+            told.contains(&format!("scene.ron:2:{column}: ")) && told.contains(expected),
+            "{part}: {told}"
+        );
+    }
+    let told = with_settings(VALID, &[("render.samples", "banana")]).expect_err("it is none");
+    assert_eq!(told.to_string(), "--set:1:16: expected a whole number, found `banana`");
+}
+
+/// A number is a grey wherever a colour stands, whether or not a texture might.
+#[test]
+fn a_number_is_a_grey_everywhere() {
+    let grey = scene(
+        r#"(entities: {"cam": (camera: ()),
+            "a": (light: Point(intensity: 10)), "b": (light: Spot(intensity: 10)), "c": (light: Point(power: 10)),
+            "d": (light: Directional(irradiance: 10)), "e": (shape: Sphere(), emission: Power(10)),
+            "f": (shape: Sphere(), material: "m"), "g": (shape: Sphere(), material: "n")},
+        materials: {"m": Dielectric(attenuation: (color: 0.5), scattering: (coefficient: 3), emission: 2),
+            "n": Conductor(eta: 1, k: 3)})"#,
+    );
+    let rgb = scene(
+        r#"(entities: {"cam": (camera: ()),
+            "a": (light: Point(intensity: (10, 10, 10))), "b": (light: Spot(intensity: (10, 10, 10))),
+            "c": (light: Point(power: (10, 10, 10))), "d": (light: Directional(irradiance: (10, 10, 10))),
+            "e": (shape: Sphere(), emission: Power((10, 10, 10))),
+            "f": (shape: Sphere(), material: "m"), "g": (shape: Sphere(), material: "n")},
+        materials: {"m": Dielectric(attenuation: (color: (0.5, 0.5, 0.5)), scattering: (coefficient: (3, 3, 3)),
+            emission: (2, 2, 2)), "n": Conductor(eta: (1, 1, 1), k: (3, 3, 3))})"#,
+    );
+    assert_eq!((grey.entities, grey.materials), (rgb.entities, rgb.materials));
 }
 
 #[test]
