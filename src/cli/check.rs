@@ -4,7 +4,7 @@ use super::arguments::CheckArguments;
 use super::engine;
 use super::failure::Failure;
 use super::format;
-use super::survey::{Survey, scene_warnings};
+use super::survey::{Survey, scene_warnings, sum};
 use kinora::description::{
     EntityDescription, Light, SceneDescription, SceneTexture, Shape, Texture,
 };
@@ -17,16 +17,18 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let scene = engine::load(&arguments.scene)?;
     let survey = Survey::new(&scene)?;
     let mut out = io::stdout().lock();
-    writeln!(out, "{} is a valid scene\n", arguments.scene.path.display())?;
-    let lines = contents(&scene).into_iter().chain(requirements(&survey)).chain(cost(&scene));
+    let path = arguments.scene.path.display().to_string();
+    writeln!(out, "{} is a valid scene\n", format::harmless(&path))?;
+    let lines = contents(&scene).into_iter().chain(requirements(&survey));
+    let lines = lines.chain(cost(&scene)).chain([("memory", memory(&survey))]);
     for (label, text) in lines {
-        writeln!(out, "  {label:<10} {text}")?;
+        writeln!(out, "  {label:<10} {}", format::harmless(&text))?;
     }
     for warning in scene_warnings(&scene, io::stdout().is_terminal()) {
         writeln!(out, "\n{warning}")?;
     }
     for warning in &survey.warnings {
-        writeln!(out, "\nwarning: {warning}")?;
+        writeln!(out, "\nwarning: {}", format::harmless(warning))?;
     }
     out.flush()?;
     Ok(())
@@ -97,6 +99,14 @@ fn cost(scene: &SceneDescription) -> Vec<(&'static str, String)> {
             format::count(paths * frame_count(scene) as f64)
         ),
     )]
+}
+
+/// The memory of a frame and what holds it; photons come on top.
+fn memory(survey: &Survey) -> String {
+    let parts = survey.memory.iter().filter(|(_, bytes)| *bytes > 0);
+    let parts = parts.map(|(name, bytes)| format!("{name} {}", format::bytes(*bytes)));
+    let list = parts.collect::<Vec<_>>().join(", ");
+    format!("{} for a frame: {list}", format::bytes(sum(&survey.memory)))
 }
 
 fn frame_count(scene: &SceneDescription) -> u64 {

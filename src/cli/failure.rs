@@ -1,6 +1,7 @@
 //! What can go wrong in a command, and the exit code that says so.
 
-use super::progress::say;
+use super::format::harmless;
+use super::progress::{say, say_as_it_is};
 use kinora::description::Diagnostics;
 use kinora::output::OutputError;
 use std::error::Error;
@@ -71,7 +72,7 @@ impl Failure {
         match self {
             Self::Diagnostics { plain, styled } => {
                 let text = if io::stderr().is_terminal() { styled } else { plain };
-                say(text.trim_end());
+                say_as_it_is(text.trim_end());
             }
             Self::Interrupted { .. } => say(&self.to_string()),
             Self::Stdout(error) if error.kind() == io::ErrorKind::BrokenPipe => {}
@@ -79,7 +80,7 @@ impl Failure {
                 say(&format!("error: {self}"));
                 let mut cause = self.source();
                 while let Some(error) = cause {
-                    say(&format!("  because: {error}"));
+                    say(&format!("  because: {}", harmless(&error.to_string())));
                     cause = error.source();
                 }
             }

@@ -43,6 +43,29 @@ pub fn duration(duration: Duration) -> String {
     }
 }
 
+/// A text of one line as a terminal may show it.
+///
+/// Names can hold what moves its cursor, changes its colours or turns the order of letters. Such characters are shown by
+/// their pictures (U+2400 and following) or by U+FFFD, as in diagnostics.
+pub fn harmless(text: &str) -> String {
+    let shown = |letter: char| match letter {
+        '\0'..='\x1f' => char::from_u32(0x2400 + u32::from(letter)).unwrap_or('\u{fffd}'),
+        '\x7f' => '\u{2421}',
+        '\u{80}'..='\u{9f}'
+        | '\u{200b}'..='\u{200f}'
+        | '\u{2028}'..='\u{202e}'
+        | '\u{2060}'..='\u{206f}'
+        | '\u{feff}' => '\u{fffd}',
+        other => other,
+    };
+    text.chars().map(shown).collect()
+}
+
+/// [`harmless`] of a text of several lines.
+pub fn harmless_lines(text: &str) -> String {
+    text.split('\n').map(harmless).collect::<Vec<_>>().join("\n")
+}
+
 /// `1 frame`, `2 frames`.
 pub fn plural(number: usize, noun: &str) -> String {
     if number == 1 { format!("1 {noun}") } else { format!("{number} {noun}s") }
@@ -68,6 +91,13 @@ mod tests {
         }
         assert_eq!(bytes(1_500_000), "1.50 MB");
         assert_eq!(bytes(12), "12 B");
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_shown_and_not_done() {
+        let hostile = "ball\u{1b}[2J\r\n\u{9b}31m\u{202e}x";
+        assert_eq!(harmless(hostile), "ball␛[2J␍␊\u{fffd}31m\u{fffd}x");
+        assert_eq!(harmless_lines("a\u{7}\nö камера 木"), "a␇\nö камера 木");
     }
 
     #[test]

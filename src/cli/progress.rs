@@ -196,7 +196,14 @@ fn warn(view: &View, told: &Told, text: &str) {
 
 /// Tells people something on stderr. It is lost quietly where nobody listens any more, and where `eprintln!` would
 /// panic: the pictures and the exit code are what counts.
+///
+/// Names in it cannot do anything to a terminal.
 pub fn say(text: &str) {
+    say_as_it_is(&format::harmless_lines(text));
+}
+
+/// [`say`] for excerpts of a scene, which are harmless already and have colours.
+pub fn say_as_it_is(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
@@ -236,7 +243,7 @@ impl Bars {
 
     fn print(&self, text: &str) {
         // A terminal that is gone is no reason to stop.
-        let _ = self.all.println(text);
+        let _ = self.all.println(format::harmless_lines(text));
     }
 
     fn draw(&self, watched: &Snapshot, since_start: Duration) {

@@ -218,7 +218,7 @@ impl Job {
             manifest.record(&entry)?;
             summary.add(&entry);
             for warning in &entry.report.warnings {
-                progress.warn(warning);
+                progress.warn(&format::harmless(warning));
             }
             progress.frame_done(&entry);
         }

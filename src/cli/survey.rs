@@ -17,6 +17,8 @@ pub struct Survey {
     pub integrator: String,
     /// Meshes that are divided for the camera: their names, triangles and bytes.
     pub diced: Vec<(String, usize, usize)>,
+    /// Bytes that a frame takes, by what holds them: the most of the frames looked at.
+    pub memory: Vec<(&'static str, u64)>,
     /// What the user should know.
     pub warnings: Vec<String>,
 }
@@ -28,12 +30,15 @@ impl Survey {
         frames.dedup();
         let mut simulation = Simulation::from_description(scene);
         let (mut found, mut warnings) = (Vec::new(), Vec::new());
+        let mut memory = Vec::new();
         for &frame in &frames {
             let prepared = simulation.prepare_frame(frame);
             prepared.map_err(|error| Failure::Scene(error.into()))?;
             for (feature, reason) in &simulation.world().resource::<Requirements>().features {
                 found.push((frame, words(&format!("{feature:?}")), reason.clone()));
             }
+            let taken = simulation.memory();
+            memory = [memory, taken].into_iter().max_by_key(|taken| sum(taken)).unwrap_or_default();
             for warning in simulation.warnings() {
                 if !warnings.contains(&warning) {
                     warnings.push(warning);
@@ -42,8 +47,13 @@ impl Survey {
         }
         let features = union(&frames, found);
         let (diced, integrator) = (diced(&mut simulation), simulation.integrator());
-        Ok(Self { frames, features, integrator, diced, warnings })
+        Ok(Self { frames, features, integrator, diced, memory, warnings })
     }
+}
+
+/// Bytes of all together.
+pub fn sum(memory: &[(&'static str, u64)]) -> u64 {
+    memory.iter().map(|(_, bytes)| bytes).sum()
 }
 
 /// What was divided for the camera, in the order of the names.
