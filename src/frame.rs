@@ -2,7 +2,7 @@
 
 use crate::build::bvh::{MeshTrees, RestingTree, TopLevel};
 use crate::build::density::Densities;
-use crate::build::light::LightTable;
+use crate::build::light::{LightTable, PhotonSource};
 use crate::build::{TreeMemory, trees_fit};
 use crate::description::{Layer, SceneDescription};
 use crate::extract::{
@@ -10,7 +10,7 @@ use crate::extract::{
     Requirements, Surfaces, ViewCamera, meshes_fit, method_suffices,
 };
 use crate::film::{Film, FilmError, Tile};
-use crate::integrate::{IntegrateStatus, PhotonReport, film_memory};
+use crate::integrate::{IntegrateStatus, PhotonReport, film_memory, radius_limit};
 use crate::memory::Shortage;
 use crate::shade::nesting::NestingFaults;
 use crate::world::{Camera, FrameClock, Settings};
@@ -557,10 +557,22 @@ impl Simulation {
         warnings
     }
 
+    /// What becomes of a radius that was asked for.
+    fn radius_warning(&self) -> Option<String> {
+        let world = &self.world;
+        let chosen = world.resource::<ChosenIntegrator>();
+        let source =
+            world.get_resource::<PhotonSource>().filter(|_| chosen.method.has_photons())?;
+        let (camera, bounds) =
+            (world.resource::<ViewCamera>(), world.resource::<TopLevel>().bounds());
+        radius_limit(&world.resource::<Settings>().0.photons, chosen.method, source, camera, bounds)
+    }
+
     /// What the user should know of the frame that was prepared or rendered last.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.world.resource::<ChosenIntegrator>().warnings.clone();
         warnings.extend(self.world.resource::<ViewCamera>().warning.clone());
+        warnings.extend(self.radius_warning());
         if self.world.resource::<LightTable>().is_empty() {
             warnings.push(
                 "the scene has no light: give an entity an `emission` or a `light`".to_owned(),

@@ -501,3 +501,60 @@ fn a_textured_lamp_shines_with_its_mean_from_afar() {
         [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, y)| DVec3::new(x, y, 20.0));
     e.assert_agrees("checks", 2.0 * lambert(&corners), 5e-3);
 }
+
+/// A lamp with holes over a floor that a camera from below the lamp sees: `lamp` says its shape and material.
+fn under_holes(lamp: &str, settings: &str) -> String {
+    format!(
+        r#"(
+        render: (filter: Box(), {settings}),
+        textures: {{ "half": Checker(size: 0.125, a: 0, b: 1) }},
+        meshes: {{ "square": Triangles(positions: [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], triangles: [(0, 1, 2), (0, 2, 3)], uvs: [(0, 0), (1, 0), (1, 1), (0, 1)]) }},
+        materials: {{
+            "floor": Diffuse(albedo: 0.5), "black": Diffuse(albedo: 0),
+            "whole": Masked(opacity: 1, material: "black"),
+            "quarter": Masked(opacity: 0.25, material: "black"),
+            "none": Masked(opacity: 0, material: "black"),
+            "checked": Masked(opacity: "half", material: "black"),
+            "mixed": Mix(a: "quarter", b: "black", amount: 0.25),
+        }},
+        entities: {{
+            "camera": (transform: (translation: (0, 0.5, 0), rotation: (-90, 0, 0)), camera: (fov: 20)),
+            "floor": (transform: (rotation: (-90, 0, 0)), shape: Rectangle(size: (8, 8)), material: "floor"),
+            "lamp": (transform: (translation: (0, 2, 0), rotation: (90, 0, 0)), {lamp}),
+        }})"#
+    )
+}
+
+/// Oracle: the floor under the whole lamp, times the mean opacity, and 0 without. A lamp of two sides which one sees through is seen
+/// twice, from the inside as well: a sphere of opacity `o` is `o·(2 − o)` as bright. By light rays and chance, and by photons.
+#[test]
+fn a_lamp_lights_by_as_much_as_its_holes_leave() {
+    let sphere = "shape: Sphere(radius: 0.5), two_sided: true";
+    let lamps = [
+        ("shape: Disk(radius: 1)", "none", 0.0),
+        ("shape: Disk(radius: 1)", "quarter", 0.25),
+        ("shape: Rectangle(size: (2, 2))", "mixed", 0.4375),
+        ("shape: Rectangle(size: (2, 2))", "checked", 0.5),
+        (r#"shape: Mesh("square")"#, "checked", 0.5),
+        ("shape: Disk(radius: 1), velocity: (linear: (0.1, 0, 0))", "quarter", 0.25),
+        ("shape: Sphere(radius: 0.5)", "quarter", 0.25),
+        (sphere, "quarter", 0.4375),
+    ];
+    for settings in [
+        "integrator: Path",
+        "integrator: Sppm, photons: (direct: Photons, per_pass: Some(16384), radius: 20)",
+    ] {
+        for (shape, material, share) in lamps {
+            let of = |material: &str| {
+                let lamp = format!(r#"{shape}, material: "{material}", emission: Radiance(3)"#);
+                common::mean_of_seeds(&under_holes(&lamp, settings), (6, 6), 16)
+            };
+            let (found, whole) = (of(material), of("whole"));
+            let expected = share * whole.mean;
+            let what = format!("{settings}, {shape}, {material}: {found:?}, {expected}");
+            let error = found.error.hypot(share * whole.error);
+            assert!((found.mean - expected).abs() <= 4.0 * error + 1e-3 * expected, "{what}");
+            assert!(error <= 0.02 * expected, "{what}");
+        }
+    }
+}

@@ -6,7 +6,9 @@ use common::scene;
 use glam::{DVec3, Vec3};
 use kinora::build::bvh::{MeshTrees, SceneGeometry, TopLevel};
 use kinora::build::density::Densities;
-use kinora::build::light::{Aim, LightTable, Lights, PhotonNumbers, PhotonSource, ShapeLights};
+use kinora::build::light::{
+    Aim, Endless, LightTable, Lights, PhotonNumbers, PhotonSource, ShapeLights,
+};
 use kinora::build::nesting::{NestedGeometry, Solids};
 use kinora::build::photon::{
     Keep, Photon, PhotonMap, PhotonPass, PhotonStore, PhotonTracer, QueryPoint,
@@ -55,7 +57,11 @@ impl Tables {
     }
 
     fn source(&self) -> PhotonSource {
-        PhotonSource::new(self.get::<LightTable>(), self.get::<TopLevel>().bounds(), false)
+        PhotonSource::new(
+            self.get::<LightTable>(),
+            self.get::<TopLevel>().bounds(),
+            &Endless::default(),
+        )
     }
 
     /// World positions in render space.
@@ -81,6 +87,7 @@ impl Tables {
             aim,
             storable: &storable,
             min_alpha: 0.1,
+            view: None,
             max_depth,
             inner_reflections: 100,
             keep,

@@ -190,6 +190,19 @@ impl ViewCamera {
         }
     }
 
+    /// The ray at `time` which ends at a point of render space, from the middle of the lens, and its length in metres.
+    pub fn ray_to(&self, p: DVec3, time: f32) -> (Ray, f64) {
+        let m = self.motion.at(time);
+        let axis = m.transform_vector3(DVec3::NEG_Z).normalize();
+        let origin = match &self.projection {
+            Projection::Perspective { .. } => m.translation,
+            Projection::Orthographic { .. } => p - axis * (p - m.translation).dot(axis),
+        };
+        let (d, distance) = (p - origin).normalize_and_length();
+        let d = if distance > 0.0 { d } else { axis };
+        (Ray { o: origin.as_vec3(), d: d.as_vec3(), time }, distance)
+    }
+
     /// Where a point of render space appears on the film at `time`, in pixels; `None` behind the
     /// camera.
     pub fn project(&self, p: DVec3, time: f32) -> Option<DVec2> {

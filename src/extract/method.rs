@@ -185,27 +185,49 @@ pub fn choose_integrator(
              `Sppm`, or give the light a size"
         ));
     }
-    if method.has_photons() && planes > 0 {
-        warnings.push(format!(
-            "no photons start from {planes} emitting planes, which have no end: what they light over \
-             mirrors, through glass or (with `Sppm` and `PhotonMap`) at second hand stays dark; \
-             use `Path`, or rectangles"
-        ));
-    }
-    let endless = || instances.list.iter().any(|i| !i.bounds.min.is_finite());
-    if method.has_photons() && has_far_light(&lights) && endless() {
-        warnings.push(
-            "photons of distant lights cover twice the radius of everything that has an end: what an \
-             infinite plane beyond it sends back is left out"
-                .to_owned(),
-        );
+    if method.has_photons() {
+        warnings.extend(beyond_photons(method, &requirements, &instances, &lights, &surfaces));
     }
     chosen.set_if_neq(ChosenIntegrator { method, reason, warnings });
 }
 
-fn has_far_light(lights: &PunctualLights) -> bool {
-    let far = |light: &Light<u32>| matches!(light, Light::Directional { .. } | Light::Sky { .. });
-    lights.0.iter().any(|l| far(&l.light))
+/// What neither photons nor paths find of the light that comes from infinitely far away to planes without an end.
+fn beyond_photons(
+    method: Method,
+    requirements: &Requirements,
+    instances: &Instances,
+    lights: &PunctualLights,
+    surfaces: &Surfaces,
+) -> Option<String> {
+    let is_far =
+        |light: &Light<u32>| matches!(light, Light::Directional { .. } | Light::Sky { .. });
+    let is_sharp = |light: &Light<u32>| matches!(light, Light::Directional { angle: 0.0, .. });
+    let any = |kind: fn(&Light<u32>) -> bool| lights.0.iter().any(|l| kind(&l.light));
+    let planes: Vec<&Instance> =
+        instances.list.iter().filter(|i| !i.bounds.min.is_finite()).collect();
+    if planes.is_empty() || !any(is_far) {
+        return None;
+    }
+    let casts = |plane: &&Instance| {
+        let material = plane.material;
+        // Lobes of any width are found by paths.
+        material != NOTHING && surfaces.materials.may_cast_caustics(material, f32::MIN_POSITIVE)
+    };
+    if any(is_sharp) && planes.len() > 1 && planes.iter().any(casts) {
+        return Some(
+            "a `Directional` light without an angle meets a smooth `Plane`: what that sends on to another `Plane` far from \
+             all else stays dark; give the light an `angle` (the sun's is 0.53), or use a `Rectangle` in place of the \
+             `Plane`"
+                .to_owned(),
+        );
+    }
+    (method.lights_by_photons() && requirements.has(Feature::Scattering)).then(|| {
+        format!(
+            "what a `Plane` far from all else sends into fog is not seen by `{}`; use `Path`, or a `Rectangle` in place \
+             of the `Plane`",
+            method.name()
+        )
+    })
 }
 
 /// Lights without any extent.

@@ -14,6 +14,11 @@
 //! photons are gathered, at **every** `D` of the path, the path itself leaves out all that reaches a
 //! light over `D S+ L`: a light met by chance, and light rays from a glossy `S`.
 //!
+//! Light which no photon carries comes from paths all the same: that of emitting planes, and what comes from infinitely far
+//! away to planes beyond the reach of photons ([`PhotonSource::covers`]). Photons and paths divide it by the last segment of the
+//! path, so that nothing is counted twice. Where photons bring all that is lit at second hand a path therefore goes on
+//! after its last `D` as a *leftover*, which takes such light alone.
+//!
 //! A final gathering sends rays from the first `D` and reads all photons where these meet a surface,
 //! the direct ones included. Where a ray is shorter than the disk over which it would read, the corner's
 //! other side would be read twice: it goes on as a path (Jensen 2001, *Realistic Image Synthesis
@@ -23,7 +28,7 @@
 use super::path::{Arrival, PathCounters, PathTracer};
 use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
-use crate::build::light::Receiver;
+use crate::build::light::{LightSample, PhotonSource, Receiver, ShadowEnd};
 use crate::build::nesting::Meeting;
 use crate::build::photon::{
     IrradianceMap, KnownIrradiance, PhotonMap, QueryPoint, VolumeMap, least_radius,
@@ -36,7 +41,7 @@ use crate::sampling::{Sampler, dimension};
 use crate::shade::medium::Fate;
 use crate::shade::nesting::Inside;
 use crate::shade::{Bsdf, BsdfSample, InnerReflections, TransportMode};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
 use std::ops::ControlFlow;
 
@@ -74,6 +79,10 @@ pub(super) struct EyeTracer<'a, const OPACITY: bool, I> {
     pub pixel_size: (f32, f32),
     /// Greatest radius of the first pass, metres.
     pub largest_radius: f32,
+    /// From where photons start.
+    pub source: &'a PhotonSource,
+    /// Whether there is light that no photon carries.
+    pub has_leftovers: bool,
 }
 
 /// Which random numbers a camera path has.
@@ -146,6 +155,19 @@ pub(super) enum Since {
     Specular,
 }
 
+/// What a path looks for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Task {
+    /// All that its method has.
+    All,
+    /// The same as a ray of a final gathering: where it meets something storable it reads all photons.
+    Reads,
+    /// A light, where its next ray ends.
+    Lamp,
+    /// Light which no photon carries.
+    Leftover,
+}
+
 /// A path on its way.
 #[derive(Clone, Copy)]
 pub(super) struct Walk<I> {
@@ -163,10 +185,8 @@ pub(super) struct Walk<I> {
     pub(super) length: f64,
     /// Reflections in a row inside of a solid.
     inner: InnerReflections,
-    /// Whether it belongs to a final gathering.
-    pub(super) reads: bool,
-    /// Whether it only looks for a light.
-    pub(super) last: bool,
+    /// What it looks for.
+    pub(super) task: Task,
     /// Whether it may still be split in two at a surface of glass.
     whole: bool,
 }
@@ -202,8 +222,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             met: 0,
             length: 0.0,
             inner: InnerReflections::new(self.path.inner_reflections),
-            reads: false,
-            last: false,
+            task: Task::All,
             whole: true,
         };
         let mut context = Context {
@@ -223,7 +242,13 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
 
     /// Whether light met by chance on this path is left to photons.
     fn left_to_photons(&self, walk: &Walk<I>) -> bool {
-        walk.since == Since::Specular && self.method != Method::Sppm
+        walk.task == Task::Leftover
+            || (walk.since == Since::Specular && self.method != Method::Sppm)
+    }
+
+    /// Whether no photon comes from infinitely far away against a ray.
+    fn is_beyond(&self, o: DVec3, d: Vec3) -> bool {
+        self.source.has_beyond && !self.source.covers(o, d)
     }
 
     fn walk(&self, mut walk: Walk<I>, sampler: &Sampler, context: &mut Context) {
@@ -256,7 +281,9 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         if I::NESTS && hit.is_none() {
             self.path.scene.nested().escape(&walk.inside, &mut context.counters.nesting);
         }
-        if hit.is_none() && !self.left_to_photons(walk) {
+        let taken =
+            || !self.left_to_photons(walk) || self.is_beyond(walk.ray.o.as_dvec3(), walk.ray.d);
+        if hit.is_none() && taken() {
             let (light, transmittance) =
                 self.path.behind(&walk.ray, walk.throughput, walk.arrival, walk.depth);
             context.sample.radiance += light;
@@ -309,20 +336,28 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             };
             roulette = left;
         }
-        if !self.left_to_photons(walk) {
+        if !self.left_to_photons(walk) || self.path.scene.lights.is_met_by_chance(hit.instance) {
             let time = walk.ray.time;
             let emitted = self.path.emitted(hit, &surface, wo, time, walk.arrival);
             context.sample.radiance += self.path.limited(walk.throughput * emitted, walk.depth);
         }
-        if walk.last {
+        if walk.task == Task::Lamp && !self.looks_for_leftovers(walk) {
             return false;
         }
         let (media, sides) = ((material, outside), [&mut walk.inside, &mut beyond]);
         let medium = self.path.disperse(media, sides, &mut walk.throughput, sampler);
         let mut lobe = sampler.one(dimensions + dimension::LOBE);
         let seen = (&walk.ray, walk.cone);
-        let bsdf = (material != NOTHING)
-            .then(|| self.path.bsdf(seen, hit, &mut surface, &at, medium, &mut lobe));
+        // Photons were weighted by the normal of the shape, before a relief turns it.
+        let smooth = surface;
+        let mut storable = false;
+        let bsdf = (material != NOTHING).then(|| {
+            let chosen = self.path.choose(seen, hit, &mut surface, &at, &mut lobe);
+            let (materials, min_alpha) = (&scene.surfaces.materials, self.settings.min_alpha());
+            let (at, gathers) = materials.storable_at(chosen.material, &at, min_alpha);
+            storable = gathers;
+            self.path.bsdf(chosen, &at, medium)
+        });
         let Some(bsdf) = bsdf else { return false };
         if walk.depth == self.path.max_depth {
             context.counters.truncated += 1;
@@ -332,19 +367,10 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         let vertex = Vertex::new(surface, ray_origin, wo, bsdf);
         let sides = Sides { here: walk.inside, beyond };
         let receiver = vertex.receiver();
-        let storable = bsdf.is_storable(self.settings.min_alpha());
-        // A ray of a final gathering reads all photons where it is long enough.
-        let read_here = storable && walk.reads && self.read(walk, hit, &vertex, context);
         let (direction, on_light) = sampler.four(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
-        if !read_here {
-            if self.takes_light_rays(walk, &bsdf, storable) {
-                let choose = sampler.one_fine(dimensions + dimension::LIGHT);
-                self.light_rays(walk, &vertex, &receiver, (choose, on_light), &sides, context);
-            }
-            if storable {
-                self.gather_here(walk, &vertex, context);
-            }
-        }
+        let place = GatherPoint::new(&vertex, &smooth, storable);
+        let drawn = || (sampler.one_fine(dimensions + dimension::LIGHT), on_light);
+        let read_here = self.collect(walk, hit, &place, &receiver, drawn, &sides, context);
         let gathers = storable && self.gathers_finally(walk);
         if gathers {
             self.final_gathering(walk, &vertex, &receiver, &sides, context);
@@ -355,16 +381,53 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         };
         context.counters.let_out += u64::from(walk.inner.was_let_out());
         let diffuse = storable && !drawn.delta;
-        if diffuse && (read_here || gathers || self.ends_at_diffuse(walk)) {
+        let ends = diffuse && (read_here || gathers || self.ends_at_diffuse(walk));
+        if ends && (gathers || !self.looks_for_leftovers(walk)) {
             return false;
         }
         self.turn(walk, &vertex, &receiver, (wi, &drawn), diffuse, &sides);
-        if walk.last {
+        if walk.task == Task::Lamp {
             return true;
         }
         self.survives(walk, || {
             roulette.unwrap_or_else(|| sampler.one(dimensions + dimension::ROULETTE))
         })
+    }
+
+    /// Turns a path which would end into one that looks for what no photon carries, if there is such.
+    fn looks_for_leftovers(&self, walk: &mut Walk<I>) -> bool {
+        if self.has_leftovers {
+            walk.task = Task::Leftover;
+        }
+        self.has_leftovers
+    }
+
+    /// Adds what a surface scatters towards the path: what photons bring, and light from a point of a light, for which it
+    /// asks for the numbers. Whether all photons were read there.
+    #[expect(clippy::too_many_arguments, reason = "both ends of a connection, and what is between")]
+    fn collect(
+        &self,
+        walk: &Walk<I>,
+        hit: &Hit,
+        place: &GatherPoint,
+        receiver: &Receiver,
+        drawn: impl FnOnce() -> (f64, Vec2),
+        sides: &Sides<I>,
+        context: &mut Context,
+    ) -> bool {
+        let GatherPoint { vertex, storable, .. } = *place;
+        // A ray of a final gathering reads all photons where it is long enough.
+        let reads = storable && walk.task == Task::Reads;
+        let read_here = reads && self.read(walk, hit, place, context);
+        let by_paths = !read_here && walk.task != Task::Leftover;
+        let any = by_paths && self.takes_light_rays(walk, &vertex.bsdf, storable);
+        if any || (self.has_leftovers && vertex.bsdf.has_non_delta()) {
+            self.light_rays(walk, any, vertex, receiver, drawn(), sides, context);
+        }
+        if by_paths && storable {
+            self.gather_here(walk, place, context);
+        }
+        read_here
     }
 
     /// Russian roulette by a number in `[0, 1)`: whether the path goes on.
@@ -417,24 +480,21 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     /// Whether a path ends where a diffuse lobe would take it on; otherwise `Sppm` and `PhotonMap` send one ray
     /// more, which looks for lights alone.
     fn ends_at_diffuse(&self, walk: &mut Walk<I>) -> bool {
-        match self.method {
-            Method::Sppm if self.settings.direct == DirectLight::Photons => true,
-            Method::Sppm => {
-                walk.last = true;
-                false
-            }
-            Method::PhotonMap => {
-                walk.last = !walk.reads;
-                false
-            }
-            Method::Path | Method::PathWithPhotons => false,
+        if walk.task != Task::All {
+            return false;
         }
+        match self.method {
+            Method::Sppm if self.settings.direct == DirectLight::Photons => return true,
+            Method::Sppm | Method::PhotonMap => walk.task = Task::Lamp,
+            Method::Path | Method::PathWithPhotons => {}
+        }
+        false
     }
 
     fn gathers_finally(&self, walk: &Walk<I>) -> bool {
         self.method == Method::PhotonMap
             && self.final_gather > 0
-            && !walk.reads
+            && walk.task == Task::All
             && walk.since == Since::Never
     }
 
@@ -449,10 +509,12 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         self.method == Method::Sppm || walk.since == Since::Never
     }
 
-    /// Sends a ray to a point of a light, drawn by these numbers.
+    /// Sends a ray to a point of a light, drawn by these numbers: of any, or of what no photon carries.
+    #[expect(clippy::too_many_arguments, reason = "both ends of a connection, and what is between")]
     fn light_rays(
         &self,
         walk: &Walk<I>,
+        any: bool,
         vertex: &Vertex,
         receiver: &Receiver,
         drawn: (f64, Vec2),
@@ -460,12 +522,19 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         context: &mut Context,
     ) {
         let time = walk.ray.time;
-        let light = self.path.direct(vertex, receiver, sides, drawn, time, context.counters);
+        let (choose, on_light) = drawn;
+        let light = self.path.scene.lights.sample(receiver, time, choose, on_light);
+        let is_beyond = |light: &LightSample| {
+            matches!(light.end, ShadowEnd::Infinity) && self.is_beyond(receiver.p, light.wi)
+        };
+        let Some(light) = light.filter(|light| any || is_beyond(light)) else { return };
+        let counters = &mut *context.counters;
+        let light = self.path.connect_to(&light, vertex, receiver, sides, drawn, time, counters);
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
     }
 
     /// Gathers what the method has at a storable point of a camera path.
-    fn gather_here(&self, walk: &Walk<I>, vertex: &Vertex, context: &mut Context) {
+    fn gather_here(&self, walk: &Walk<I>, place: &GatherPoint, context: &mut Context) {
         let mut light = Rgb::ZERO;
         let global = match self.method {
             Method::Sppm => true,
@@ -473,17 +542,20 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             Method::Path | Method::PathWithPhotons => false,
         };
         if global {
-            light += self.gather(self.maps.global, walk, vertex, context);
+            light += self.gather(self.maps.global, walk, place, context);
         }
         if self.method != Method::Sppm {
-            light += self.gather(self.maps.caustics, walk, vertex, context);
+            light += self.gather(self.maps.caustics, walk, place, context);
         }
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
     }
 
     /// Reads all photons at the end of a ray of a final gathering; `false` if the ray is too short.
-    fn read(&self, walk: &Walk<I>, hit: &Hit, vertex: &Vertex, context: &mut Context) -> bool {
+    fn read(&self, walk: &Walk<I>, hit: &Hit, place: &GatherPoint, context: &mut Context) -> bool {
+        let vertex = place.vertex;
+        // What is known beforehand is the irradiance of the surface without a relief.
         if let Bsdf::Diffuse(diffuse) = vertex.bsdf
+            && place.weighted_by.is_none()
             && let Some(known) = self.known(walk, vertex)
         {
             if hit.t < f64::from(known.radius) {
@@ -499,7 +571,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         if hit.t < f64::from(query.radius) {
             return false;
         }
-        let light = self.estimate(self.maps.global, &query, walk, vertex, context);
+        let light = self.estimate(self.maps.global, &query, walk, place, context);
         context.sample.radiance += self.path.limited(walk.throughput * light, walk.depth);
         true
     }
@@ -531,7 +603,8 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             let dimensions = dimension::vertex(walk.met - 1);
             let lobe = sampler.one(dimensions + dimension::LOBE);
             let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
-            let mut ray = Walk { reads: true, throughput: walk.throughput / n as f32, ..*walk };
+            let mut ray =
+                Walk { task: Task::Reads, throughput: walk.throughput / n as f32, ..*walk };
             let drawn = vertex.scatter(lobe, direction, &mut ray.inner);
             let Some((wi, drawn)) = drawn else { continue };
             if drawn.delta {
@@ -573,7 +646,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
 
     /// Whether rays were sent to the lights from the surface that is left.
     fn path_takes_light(&self, walk: &Walk<I>, diffuse: bool) -> bool {
-        diffuse || self.method == Method::Sppm || walk.since == Since::Never
+        diffuse || self.method == Method::Sppm || walk.since == Since::Never || self.has_leftovers
     }
 
     /// The disk over which photons are gathered at a point of a path.
@@ -623,14 +696,14 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         &self,
         map: &PhotonMap,
         walk: &Walk<I>,
-        vertex: &Vertex,
+        place: &GatherPoint,
         context: &mut Context,
     ) -> Rgb {
         if map.is_empty() {
             return Rgb::ZERO;
         }
-        let query = self.query(map, walk, vertex, context);
-        self.estimate(map, &query, walk, vertex, context)
+        let query = self.query(map, walk, place.vertex, context);
+        self.estimate(map, &query, walk, place, context)
     }
 
     /// The radiance estimate `Σ f Φ K` over a disk.
@@ -639,9 +712,10 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
         map: &PhotonMap,
         query: &QueryPoint,
         walk: &Walk<I>,
-        vertex: &Vertex,
+        place: &GatherPoint,
         context: &mut Context,
     ) -> Rgb {
+        let vertex = place.vertex;
         let kernel = self.settings.kernel;
         let radius2 = query.radius * query.radius;
         let allowed = self.path.max_depth.saturating_sub(walk.depth);
@@ -659,7 +733,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
                 return;
             }
             let back = shaded.thrown_back(wi);
-            let weight = kernel.weight(distance2, radius2);
+            let weight = kernel.weight(distance2, radius2) * place.share(wi);
             match vertex.bsdf {
                 Bsdf::Diffuse(_) if vertex.crosses(wi) => {}
                 // The same for all: it is multiplied by at the end.
@@ -685,5 +759,32 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             Bsdf::Diffuse(diffuse) => light * diffuse.albedo * FRAC_1_PI,
             _ => light,
         }
+    }
+}
+
+/// A point of a path where photons are gathered.
+struct GatherPoint<'v, 'a> {
+    vertex: &'v Vertex<'a>,
+    /// Whether there are photons to gather.
+    storable: bool,
+    /// The surface by whose shading normal photons were weighted where they were left, if that is not the one of
+    /// the vertex.
+    weighted_by: Option<&'v SurfacePoint>,
+}
+
+impl<'v, 'a> GatherPoint<'v, 'a> {
+    fn new(vertex: &'v Vertex<'a>, smooth: &'v SurfacePoint, storable: bool) -> Self {
+        let weighted_by = (vertex.surface.ns != smooth.ns).then_some(smooth);
+        Self { vertex, storable, weighted_by }
+    }
+
+    /// The factor on a photon from the direction `wi`: its cosine to the normal of the vertex over that to the normal by which
+    /// it was weighted. It is not bounded where light grazes a surface whose relief faces it: such photons are as rare as
+    /// they are heavy.
+    #[inline]
+    fn share(&self, wi: Vec3) -> f32 {
+        let Some(smooth) = self.weighted_by else { return 1.0 };
+        let share = (wi.dot(self.vertex.surface.ns) / wi.dot(smooth.normal_seen_from(wi))).abs();
+        if share.is_finite() { share } else { 0.0 }
     }
 }

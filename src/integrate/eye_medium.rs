@@ -5,7 +5,7 @@
 //! light rays bring is looked for along the way, and photons are gathered along all of it. With `Path` it is scattered as
 //! a path is, and gathers caustics alone.
 
-use super::eye::{Context, EyeTracer, Since, Walk};
+use super::eye::{Context, EyeTracer, Since, Task, Walk};
 use super::medium::{Deflection, Flown, LOOKS, Stretch};
 use crate::build::bvh::Hit;
 use crate::build::photon::{Photon, VolumeMap};
@@ -29,13 +29,13 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
             return Fate::Through;
         };
         let left = Left::new(&stretch, sampler);
-        let scatters = self.method == Method::PathWithPhotons && !walk.last;
+        let scatters = self.method == Method::PathWithPhotons && walk.task != Task::Lamp;
         let (light, flown) = if scatters {
             let (light, flown) = self.path.flown(&stretch, walk.depth, sampler, context.counters);
             let caustics = self.maps.volume_caustics;
             (light + self.along(caustics, &stretch, &left, walk.depth, |_| true), flown)
         } else {
-            let light = if walk.last {
+            let light = if matches!(walk.task, Task::Lamp | Task::Leftover) {
                 Rgb::ZERO
             } else {
                 self.gathered_along(walk, &stretch, &left, sampler, context)
@@ -77,7 +77,7 @@ impl<const OPACITY: bool, I: Inside> EyeTracer<'_, OPACITY, I> {
     ) -> Rgb {
         let photons_alone =
             self.method == Method::Sppm && self.settings.direct == DirectLight::Photons;
-        if walk.reads || photons_alone {
+        if walk.task == Task::Reads || photons_alone {
             return self.along(self.maps.volume, stretch, left, walk.depth, |_| true);
         }
         let mut light = Rgb::ZERO;

@@ -198,7 +198,7 @@ impl<'a> Begin<'a> {
     /// What a sample stands for at the camera, half way through the shutter: the more samples, the less, down to
     /// an eighth of a pixel across (Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, 4th ed.,
     /// section 10.1.3).
-    fn pixel(&self) -> Cone {
+    pub(super) fn pixel(&self) -> Cone {
         let textures = self.scene.surfaces.materials.textures();
         if textures.filtering() == TextureFiltering::Point || textures.is_empty() {
             return Cone::default();

@@ -80,7 +80,9 @@ impl<const OPACITY: bool, I: Inside> PathTracer<'_, OPACITY, I> {
                             } else {
                                 0.0
                             };
-                            self.bsdf((&ray, cone), &hit, &mut surface, &at, medium, &mut lobe)
+                            let seen = (&ray, cone);
+                            let chosen = self.choose(seen, &hit, &mut surface, &at, &mut lobe);
+                            self.bsdf(chosen, &at, medium)
                         });
                         return self.seen_at(camera_ray, &ray, &hit, &surface, bsdf.as_ref());
                     }

@@ -17,6 +17,7 @@ pub use film_pass::film_memory;
 pub use film_pass::{IntegrateStatus, render_film};
 pub use path::{PathCounters, PathTracer};
 pub use photon_passes::{PhotonReport, PhotonScratch, render_film_with_photons};
+pub(crate) use radius::radius_limit;
 pub use radius::{PixelRadius, shrunk_by_passes};
 pub use scene_view::SceneView;
 

@@ -18,7 +18,7 @@ use super::medium::numbers;
 use super::share::{Departure, Landing, SharedPath};
 use super::vertex::{Sides, Vertex};
 use crate::build::bvh::{Hit, SurfacePoint};
-use crate::build::light::Receiver;
+use crate::build::light::{LightSample, Receiver};
 use crate::build::nesting::Meeting;
 use crate::description::{Background, Rgb};
 use crate::extract::{CameraRay, NOTHING};
@@ -26,7 +26,7 @@ use crate::film::{PixelSample, Seen};
 use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension, power_heuristic};
 use crate::shade::nesting::{Inside, NestingFaults};
-use crate::shade::{Bsdf, BsdfSample, InnerReflections, TexturePoint};
+use crate::shade::{Bsdf, BsdfSample, Chosen, InnerReflections, TexturePoint};
 use glam::{DVec3, Vec2, Vec3};
 use std::ops::ControlFlow;
 
@@ -305,7 +305,8 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
                 0.0
             };
             let seen = (&path.ray, path.cone);
-            let bsdf = self.bsdf(seen, &hit, &mut surface, &at, medium, &mut lobe);
+            let chosen = self.choose(seen, &hit, &mut surface, &at, &mut lobe);
+            let bsdf = self.bsdf(chosen, &at, medium);
             if path.depth == self.max_depth {
                 counters.truncated += 1;
                 break;
@@ -389,18 +390,16 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         self.scene.nested().meet(ray, hit, inside, &mut counters.nesting)
     }
 
-    /// How the surface scatters that a ray in a cone has met, with the relief of its material; `medium` is what is on
-    /// its outside, and the wavelength of the path.
+    /// What of a material is at a point that was hit, chosen by `lobe`, with its relief: seen by a ray in a cone.
     #[inline]
-    pub(super) fn bsdf(
+    pub(super) fn choose(
         &self,
         (ray, cone): (&Ray, Cone),
         hit: &Hit,
         surface: &mut SurfacePoint,
         at: &TexturePoint,
-        (outside, wavelength): (Option<u32>, Option<f32>),
         lobe: &mut f32,
-    ) -> Bsdf<'a> {
+    ) -> Chosen {
         let SceneView { geometry, surfaces, .. } = self.scene;
         let materials = &surfaces.materials;
         let material = geometry.instances[hit.instance as usize].material;
@@ -408,6 +407,18 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         if let Some(relief) = chosen.relief {
             geometry.turn_normal((materials, relief), cone, ray, hit, surface, at);
         }
+        chosen
+    }
+
+    /// How a chosen material scatters at a point; `medium` is what is on its outside, and the wavelength of the path.
+    #[inline]
+    pub(super) fn bsdf(
+        &self,
+        chosen: Chosen,
+        at: &TexturePoint,
+        (outside, wavelength): (Option<u32>, Option<f32>),
+    ) -> Bsdf<'a> {
+        let materials = &self.scene.surfaces.materials;
         if I::NESTS {
             materials.chosen_bsdf_tuned(chosen.material, at, outside, wavelength)
         } else {
@@ -553,6 +564,22 @@ impl<'a, const OPACITY: bool, I: Inside> PathTracer<'a, OPACITY, I> {
         let Some(light) = self.scene.lights.sample(receiver, time, choose, on_light) else {
             return Rgb::ZERO;
         };
+        self.connect_to(&light, vertex, receiver, sides, (choose, on_light), time, counters)
+    }
+
+    /// Light which arrives straight from a point of a light that was drawn by these numbers.
+    #[expect(clippy::too_many_arguments, reason = "both ends of a connection, and what is between")]
+    #[inline]
+    pub(super) fn connect_to(
+        &self,
+        light: &LightSample,
+        vertex: &Vertex,
+        receiver: &Receiver,
+        sides: &Sides<I>,
+        (choose, on_light): (f64, Vec2),
+        time: f32,
+        counters: &mut PathCounters,
+    ) -> Rgb {
         let (f_cos, pdf) = vertex.evaluate(light.wi);
         if f_cos == Rgb::ZERO {
             return Rgb::ZERO;

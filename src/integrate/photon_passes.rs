@@ -20,13 +20,14 @@ use super::{PathCounters, PathTracer};
 use crate::build::light::{Aim, PhotonSource};
 use crate::build::photon::{
     IrradianceMap, Keep, Photon, PhotonCounters, PhotonMap, PhotonPass, PhotonStore, PhotonTracer,
-    PlaceSettings, VolumeMap, VolumeRadius,
+    PlaceSettings, TextureView, VolumeMap, VolumeRadius,
 };
 use crate::color::spectrum::SETS;
 use crate::description::DirectLight;
 use crate::extract::{ChosenIntegrator, Feature, FrameOrigin, Method, NOTHING};
 use crate::film::{Film, FilmError, Tile, TileBuffer};
 use crate::frame::RenderControl;
+use crate::math::Cone;
 use crate::memory::{Shortage, ask};
 use crate::sampling::{Sampler, dimension};
 use crate::shade::nesting::{Clear, Inside, NestingFaults, OneSolid, SolidStack, Whole};
@@ -146,7 +147,7 @@ pub fn render_film_with_photons(
     let scene = tables.view();
     let job = Job::new(settings, &scene, clock.frame.cast_unsigned(), &control);
     let begin = Begin { scene, settings, origin: &origin, seen: film.wants_seen() };
-    let setting = Setting::new(&scene, &job, chosen.method, &source);
+    let setting = Setting::new(&scene, &job, chosen.method, &source, begin.pixel());
     let scratch = &mut *scratch;
     let opaque = !scene.requirements.has(Feature::Opacity);
     let film_mut = &mut film;
@@ -189,6 +190,13 @@ fn warnings(report: &PhotonReport, setting: &Setting) -> Vec<String> {
             3.0 / report.emitted.max(1) as f64
         ));
     }
+    let asked = setting.asked();
+    if report.per_pass < asked {
+        warnings.push(format!(
+            "each pass has {} photons and not {asked}: more would not fit into `photons.max_memory`, {} MiB",
+            report.per_pass, setting.job.settings.photons.max_memory
+        ));
+    }
     if report.unresolved > 0 {
         warnings.push(format!(
             "{} gather disks stopped shrinking: 32-bit positions have no more digits there",
@@ -208,6 +216,8 @@ struct Setting<'a> {
     /// Around what casts caustics; `None` where photons cannot be aimed.
     aim: Option<Aim>,
     casts: bool,
+    /// What a camera sample stands for; a ray where no texture is filtered.
+    pixel: Cone,
 }
 
 impl<'a> Setting<'a> {
@@ -216,6 +226,7 @@ impl<'a> Setting<'a> {
         job: &'a Job<'a>,
         method: Method,
         source: &'a PhotonSource,
+        pixel: Cone,
     ) -> Self {
         let materials = &scene.surfaces.materials;
         let min_alpha = job.settings.photons.min_alpha();
@@ -230,7 +241,8 @@ impl<'a> Setting<'a> {
             .map(|i| i.bounds)
             .collect();
         let aim = Aim::new(&casters);
-        Self { scene: *scene, job, method, source, storable, aim, casts: !casters.is_empty() }
+        let casts = !casters.is_empty();
+        Self { scene: *scene, job, method, source, storable, aim, casts, pixel }
     }
 
     fn has_light(&self) -> bool {
@@ -253,6 +265,8 @@ impl<'a> Setting<'a> {
             aim: self.aim.as_ref().filter(|_| keep == Keep::Caustics),
             storable: &self.storable,
             min_alpha: self.job.settings.photons.min_alpha(),
+            view: (!self.pixel.is_ray())
+                .then_some(TextureView { camera: scene.camera, pixel: self.pixel }),
             max_depth: self.job.settings.max_depth,
             inner_reflections: self.job.settings.inner_reflections,
             keep,
@@ -281,11 +295,17 @@ impl<'a> Setting<'a> {
         self.casts && self.method != Method::Sppm
     }
 
+    /// How many photons a pass is to emit.
+    fn asked(&self) -> u32 {
+        let settings = self.job.settings;
+        let aimed = self.method == Method::PathWithPhotons && self.aim.is_some();
+        settings.photons.emitted(settings.size, aimed)
+    }
+
     /// How many photons a pass emits: as many as asked for, unless the memory does not suffice.
     fn plan<const O: bool, I: Inside>(&self, scratch: &mut PhotonScratch) -> PhotonReport {
         let settings = self.job.settings;
-        let aimed = self.method == Method::PathWithPhotons && self.aim.is_some();
-        let asked = settings.photons.emitted(settings.size, aimed);
+        let asked = self.asked();
         let pilot =
             PhotonPass { emitted: PILOT.min(asked), ..self.photon_pass(u32::MAX, asked, 0.5) };
         let keeps = [self.global_keep(), self.has_caustic_map().then_some(Keep::Caustics)];
@@ -483,6 +503,8 @@ impl<'a> Setting<'a> {
             },
             pixel_size: (side as f32, growth as f32),
             largest_radius: self.largest_radius(),
+            source: self.source,
+            has_leftovers: self.source.has_beyond || self.scene.lights.has_met_by_chance(),
         }
     }
 
@@ -498,8 +520,7 @@ impl<'a> Setting<'a> {
 
     /// Greatest radius over which photons are gathered, metres.
     fn largest_radius(&self) -> f32 {
-        let reach = self.source.reach.map_or(f64::INFINITY, |reach| reach.radius);
-        self.job.settings.photons.largest_radius * reach as f32
+        self.source.largest_radius(&self.job.settings.photons)
     }
 }
 

@@ -27,6 +27,12 @@
 //! `R_{i+1}² = R_i² (i + α)/(i + 1)` (Knaus and Zwicker 2011, "Progressive Photon Mapping: A
 //! Probabilistic Approach", ACM Trans. Graph. 30(3), eq. 20). Both laws go to zero as `i^((α−1)/2)`.
 
+use crate::build::light::PhotonSource;
+use crate::description::PhotonSettings;
+use crate::extract::{Method, ViewCamera};
+use crate::math::Aabb;
+use glam::Vec3;
+
 /// What a pixel remembers of the passes so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelRadius {
@@ -75,6 +81,49 @@ pub fn shrunk_by_passes(pass: u32, alpha: f32) -> f32 {
     let alpha = f64::from(alpha);
     let scale2: f64 = (1..=pass).map(|i| (f64::from(i) + alpha) / (f64::from(i) + 1.0)).product();
     scale2.sqrt() as f32
+}
+
+/// The middle of the shutter.
+const MIDDLE: f32 = 0.5;
+
+/// What a first radius that was asked for comes to, in words, where it is not what is used: at the far end of
+/// `bounds`, around all that has an end.
+pub fn radius_limit(
+    photons: &PhotonSettings,
+    method: Method,
+    source: &PhotonSource,
+    camera: &ViewCamera,
+    bounds: Aabb,
+) -> Option<String> {
+    if photons.radius == PhotonSettings::default().radius || bounds.is_empty() {
+        return None;
+    }
+    if method == Method::PhotonMap {
+        return Some(format!(
+            "`photons.radius` {} is not used: `PhotonMap` gathers the `photons.nearest` {}, `Sppm` and `Path` over a radius",
+            photons.radius, photons.nearest
+        ));
+    }
+    let largest = f64::from(source.largest_radius(photons));
+    let (side, growth) = camera.pixel_size(MIDDLE);
+    let pixels = f64::from(photons.radius);
+    let corners = [0, 1, 2, 3, 4, 5, 6, 7].map(|k| {
+        let end = |bit: u32| if k >> bit & 1 == 0 { bounds.min } else { bounds.max };
+        Vec3::new(end(0).x, end(1).y, end(2).z).as_dvec3()
+    });
+    let distances = corners.map(|corner| camera.ray_to(corner, MIDDLE).1);
+    let farthest = distances.into_iter().fold(0.0, f64::max);
+    let asked = pixels * (side + growth * farthest);
+    if asked <= largest {
+        return None;
+    }
+    let from = ((largest / pixels - side) / growth).max(0.0);
+    let from = if from.is_finite() { from } else { 0.0 };
+    Some(format!(
+        "`photons.radius` {} would be {asked:.2} m at the far end of the scene: from {from:.2} m on before the camera {largest:.2} m is \
+         used, since `photons.largest_radius` {} is a share of the radius of the scene; raise it for more blur",
+        photons.radius, photons.largest_radius
+    ))
 }
 
 #[cfg(test)]

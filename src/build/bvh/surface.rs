@@ -60,6 +60,13 @@ impl SurfacePoint {
         }
     }
 
+    /// The normal by which what is seen from `wo` is shaded: from beyond its horizon a shading normal cannot say what is
+    /// reflected where.
+    #[inline]
+    pub fn normal_seen_from(&self, wo: Vec3) -> Vec3 {
+        if wo.dot(self.ns) * wo.dot(self.ng) <= 0.0 { self.ng } else { self.ns }
+    }
+
     /// The shading frame around `ns`. No material yet distinguishes a direction of the tangent plane.
     pub fn frame(&self) -> Frame {
         Frame::from_z(self.ns)

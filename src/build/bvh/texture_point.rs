@@ -69,20 +69,33 @@ impl SceneGeometry<'_> {
         TexturePoint { axes, width: shrink as f32, ..at }
     }
 
-    /// Turns the shading normal where a ray hit as the relief of a material says.
+    /// Turns the shading normal where a ray hit as the relief of a material says, for who looks along the ray.
     pub fn turn_normal(
         &self,
-        (materials, relief): (&MaterialTable, u32),
+        turn: (&MaterialTable, u32),
         cone: Cone,
         ray: &Ray,
         hit: &Hit,
         surface: &mut SurfacePoint,
         at: &TexturePoint,
     ) {
+        let ns = self.relief_normal(turn, cone, ray, hit, surface, at);
+        surface.ns = bent_normal(ns, surface.ng, -ray.d);
+    }
+
+    /// The shading normal where a ray hit as the relief of a material says, whoever looks at it.
+    pub fn relief_normal(
+        &self,
+        (materials, relief): (&MaterialTable, u32),
+        cone: Cone,
+        ray: &Ray,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        at: &TexturePoint,
+    ) -> Vec3 {
         let around = || self.surroundings(cone, ray, hit, surface, at);
         let along = || self.tangents(ray, hit, surface);
-        let ns = materials.relief_normal(relief, surface.ns, at, around, along);
-        surface.ns = bent_normal(ns, surface.ng, -ray.d);
+        materials.relief_normal(relief, surface.ns, at, around, along)
     }
 
     /// The points around one, as textures see them.

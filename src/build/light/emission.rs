@@ -16,22 +16,69 @@
 use super::towards::{DistantCone, axis_of, spot_falloff};
 use super::{Aim, BoundingSphere, Emitter, LightTable, Lights};
 use crate::build::bvh::{SurfacePoint, TopLevel};
-use crate::description::{Light, Rgb};
-use crate::extract::{Geometry, Instances, PunctualLight};
+use crate::description::{Light, PhotonSettings, Rgb};
+use crate::extract::{
+    Geometry, Instance, Instances, NOTHING, PunctualLight, PunctualLights, Surfaces,
+};
 use crate::math::{Aabb, Frame, Ray, offset_ray_origin};
 use crate::sampling::Piecewise1D;
 use crate::sampling::warp::{
     cosine_hemisphere, cosine_hemisphere_pdf, square_to_disk, uniform_cone, uniform_sphere,
 };
+use crate::shade::MaterialTable;
 use crate::shape::{AreaFactor, triangle_area};
 use bevy_ecs::prelude::*;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, TAU};
 use std::f64::consts::PI;
 
-/// How much larger the reach is where the scene has an infinite plane: light which meets the plane
-/// beyond it does not come back as photons.
+/// How much larger the reach is where the scene has an infinite plane. Light which meets the plane beyond it is not in the photons
+/// ([`PhotonSource::covers`]).
 const REACH_WITH_PLANES: f64 = 2.0;
+/// What of a scene has no end.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Endless {
+    /// Whether there are planes.
+    pub planes: bool,
+    /// A point and the normal of each plane that mirrors or lets through, where there is a light without any extent infinitely
+    /// far away: what the plane makes of it no path can find.
+    pub mirrors: Vec<[DVec3; 2]>,
+}
+
+impl Endless {
+    /// What instances and lights without an end are.
+    pub fn of(instances: &[Instance], materials: &MaterialTable, lights: &[PunctualLight]) -> Self {
+        let is_sharp = |l: &PunctualLight| matches!(l.light, Light::Directional { angle: 0.0, .. });
+        let is_sharp = lights.iter().any(is_sharp);
+        let mut endless = Self::default();
+        for plane in instances.iter().filter(|i| !i.bounds.min.is_finite()) {
+            endless.planes = true;
+            let has_delta = plane.material != NOTHING
+                && materials.may_cast_caustics(plane.material, f32::MIN_POSITIVE);
+            if is_sharp && has_delta {
+                // The plane is y = 0 before its map; a moving one is met at both ends of the shutter.
+                endless.mirrors.extend([0.0, 1.0].map(|time| {
+                    let (map, inverse) = plane.motion.both_at(time);
+                    let normal = inverse.matrix3.transpose() * DVec3::Y;
+                    [map.translation, normal.normalize_or(DVec3::Y)]
+                }));
+            }
+        }
+        endless
+    }
+
+    /// How far photons from infinitely far away reach around everything that has an end. What a plane mirrors to there passes
+    /// through the mirror image of the sphere.
+    fn reach(&self, sphere: BoundingSphere) -> BoundingSphere {
+        let share = if self.planes { REACH_WITH_PLANES } else { 1.0 };
+        let images = self.mirrors.iter().map(|[p, n]| {
+            let height = (sphere.center - *p).dot(*n).abs();
+            sphere.radius + 2.0 * height
+        });
+        let radius = images.fold(share * sphere.radius, f64::max);
+        BoundingSphere { radius, ..sphere }
+    }
+}
 
 /// A photon at the moment of its emission.
 #[derive(Clone, Copy, Debug)]
@@ -63,29 +110,31 @@ pub struct PhotonSource {
     pub reach: Option<BoundingSphere>,
     /// Flux of all lights, luminance, W.
     pub flux: f64,
+    /// Whether light may come from infinitely far away to something that has no end.
+    pub has_beyond: bool,
 }
 
 /// Writes [`PhotonSource`] when the lights or the objects changed.
 pub fn rebuild_photon_source(
     lights: Res<LightTable>,
     instances: Res<Instances>,
+    surfaces: Res<Surfaces>,
+    punctual: Res<PunctualLights>,
     top: Res<TopLevel>,
     mut source: ResMut<PhotonSource>,
 ) {
-    if lights.is_changed() || instances.is_changed() || source.choice.is_none() {
-        let planes = instances.list.iter().any(|i| !i.bounds.min.is_finite());
-        *source = PhotonSource::new(&lights, top.bounds(), planes);
+    let changed = lights.is_changed() || instances.is_changed() || surfaces.is_changed();
+    if changed || source.choice.is_none() {
+        let endless = Endless::of(&instances.list, &surfaces.materials, &punctual.0);
+        *source = PhotonSource::new(&lights, top.bounds(), &endless);
     }
 }
 
 impl PhotonSource {
     /// * `bounds` — around everything that has bounds.
-    /// * `planes` — whether there is anything without.
-    pub fn new(lights: &LightTable, bounds: Aabb, planes: bool) -> Self {
-        let reach = BoundingSphere::around(&bounds).map(|sphere| BoundingSphere {
-            radius: sphere.radius * if planes { REACH_WITH_PLANES } else { 1.0 },
-            ..sphere
-        });
+    /// * `endless` — what has none.
+    pub fn new(lights: &LightTable, bounds: Aabb, endless: &Endless) -> Self {
+        let reach = BoundingSphere::around(&bounds).map(|sphere| endless.reach(sphere));
         let disk = reach.map_or(0.0, |reach| PI * reach.radius * reach.radius);
         let far = lights.far_irradiance.iter().map(|irradiance| irradiance * disk);
         let fluxes = lights.near_flux.iter().copied().chain(far);
@@ -94,7 +143,23 @@ impl PhotonSource {
         let greatest = fluxes.iter().copied().fold(0.0, f64::max);
         let choice =
             (greatest > 0.0).then(|| Piecewise1D::new(fluxes.iter().map(|flux| flux / greatest)));
-        Self { choice, reach, flux: fluxes.iter().sum() }
+        let has_beyond = endless.planes && !lights.far_irradiance.is_empty();
+        Self { choice, reach, flux: fluxes.iter().sum(), has_beyond }
+    }
+
+    /// The greatest radius over which photons are gathered, metres.
+    pub fn largest_radius(&self, photons: &PhotonSettings) -> f32 {
+        let reach = self.reach.map_or(f64::INFINITY, |reach| reach.radius);
+        photons.largest_radius * reach as f32
+    }
+
+    /// Whether photons may come from infinitely far away in the unit direction `wi` to a point: whether the line between passes
+    /// through the reach. All that has an end lies within.
+    pub fn covers(&self, p: DVec3, wi: Vec3) -> bool {
+        self.reach.is_some_and(|reach| {
+            let (from, wi) = (p - reach.center, wi.as_dvec3());
+            from.cross(wi).length_squared() <= reach.radius * reach.radius * wi.length_squared()
+        })
     }
 
     /// Draws a photon; `None` if it carries nothing. With an `aim`, only photons which may meet what
@@ -109,7 +174,7 @@ impl PhotonSource {
         let choice = self.choice.as_ref()?;
         let (index, _) = choice.sample(numbers.light);
         let probability = choice.probability(index);
-        let emitter = Emission { lights, numbers, time, aim };
+        let emitter = Emission { lights, numbers, time, aim, has_beyond: self.has_beyond };
         let mut photon = match lights.table.emitters[index] {
             Emitter::Shape(instance) => emitter.shape(instance),
             Emitter::Triangle { instance, triangle } => emitter.triangle(instance, triangle),
@@ -126,6 +191,7 @@ struct Emission<'a> {
     numbers: &'a PhotonNumbers,
     time: f32,
     aim: Option<&'a Aim>,
+    has_beyond: bool,
 }
 
 impl Emission<'_> {
@@ -182,7 +248,7 @@ impl Emission<'_> {
                 (wi, natural_pdf(wi) * sides / FRAC_1_PI / pdf)
             }
         };
-        let power = self.lights.emitted(instance, surface, wi, self.time) * (weight * area as f32);
+        let power = self.lights.sent(instance, surface, wi, self.time) * (weight * area as f32);
         let o = offset_ray_origin(surface.p, surface.p_error, surface.ng, wi);
         Some(EmittedPhoton { ray: Ray { o, d: wi, time: self.time }, power })
     }
@@ -278,7 +344,20 @@ impl Emission<'_> {
         // Back along the ray to where it enters the reach.
         let axis = d.as_dvec3();
         let o: DVec3 = p - axis * ((p - reach.center).dot(axis) + reach.radius);
-        let ray = Ray { o: o.as_vec3(), d, time: self.time };
+        let mut ray = Ray { o: o.as_vec3(), d, time: self.time };
+        if self.has_beyond {
+            self.begin_beyond(&mut ray);
+        }
         Some(EmittedPhoton { ray, power: irradiance / pdf_area as f32 })
+    }
+
+    /// Has a ray from infinitely far away begin before the planes on its way to the reach: these may stop it.
+    fn begin_beyond(&self, ray: &mut Ray) {
+        let mut back = Ray { d: -ray.d, ..*ray };
+        while let Some(hit) = self.lights.geometry.closest_hit(&back, f64::INFINITY, false) {
+            let surface = self.lights.geometry.surface(&back, &hit);
+            back.o = offset_ray_origin(surface.p, surface.p_error, surface.ng, back.d);
+        }
+        ray.o = back.o;
     }
 }

@@ -15,7 +15,7 @@ mod towards;
 mod tree;
 
 pub use aim::{Aim, BoundingSphere};
-pub use emission::{EmittedPhoton, PhotonNumbers, PhotonSource, rebuild_photon_source};
+pub use emission::{EmittedPhoton, Endless, PhotonNumbers, PhotonSource, rebuild_photon_source};
 pub use pivot::Pivot;
 pub use shapes::{ShapeLights, prepare_shape_lights};
 pub use sky::SkyLight;

@@ -44,6 +44,8 @@ pub struct Emitted {
     pub factor: f32,
     /// Whether the back emits as well.
     pub two_sided: bool,
+    /// The material of the surface if it has holes: these emit nothing.
+    pub mask: Option<u32>,
 }
 
 /// All lights of a frame.
@@ -69,6 +71,8 @@ pub struct LightTable {
     pub(super) skies: Vec<Option<SkyLight>>,
     /// Mean colour of each texture that an emission was asked for.
     averages: Vec<Option<Rgb>>,
+    /// Mean opacity of each material that an emission was asked for.
+    opacities: Vec<Option<f32>>,
     /// Whether lights at a place are to be chosen by power alone; read when the table is built. It is
     /// there to measure the tree against: `cargo bench --bench lights`.
     pub by_power: bool,
@@ -124,6 +128,8 @@ pub fn rebuild_light_table(
     if textures {
         table.averages.clear();
         table.averages.resize(surfaces.materials.textures().len(), None);
+        table.opacities.clear();
+        table.opacities.resize(surfaces.materials.len(), None);
     }
     scratch.near.clear();
     scratch.far.clear();
@@ -172,8 +178,8 @@ impl Builder<'_> {
     }
 
     /// The emission of a surface of this area: a total power is spread evenly over it, `L = Φ/(π·A)` for
-    /// each side.
-    fn emitted(&mut self, emission: &SurfaceEmission, area: f64) -> Emitted {
+    /// each side. Holes emit nothing of it.
+    fn emitted(&mut self, emission: &SurfaceEmission, area: f64, material: u32) -> Emitted {
         let two_sided = emission.two_sided;
         let mut blackbody = None;
         let (radiance, factor) = match emission.strength {
@@ -194,7 +200,9 @@ impl Builder<'_> {
             }
         };
         let factor = emission.factor * factor as f32;
-        Emitted { radiance, blackbody, factor, two_sided }
+        let masked = material != NOTHING && self.materials.has_opacity(material);
+        let mask = masked.then_some(material);
+        Emitted { radiance, blackbody, factor, two_sided, mask }
     }
 
     /// The mean of a colour over a surface.
@@ -209,6 +217,14 @@ impl Builder<'_> {
                 *known.get_or_insert_with(|| textures.average(*index))
             }
         }
+    }
+
+    /// The mean opacity of a surface: 1 but where it has holes.
+    fn mean_opacity(&mut self, mask: Option<u32>) -> f32 {
+        let Some(material) = mask else { return 1.0 };
+        let materials = self.materials;
+        let Some(known) = self.table.opacities.get_mut(material as usize) else { return 1.0 };
+        *known.get_or_insert_with(|| materials.mean_opacity(material))
     }
 
     fn add_instance(
@@ -235,9 +251,10 @@ impl Builder<'_> {
             (None, Geometry::Primitive(primitive)) => primitive.world_area(&map),
             (triangles, _) => triangles.iter().flatten().map(|triangle| triangle.area).sum(),
         };
-        let emitted = self.emitted(emission, area);
+        let emitted = self.emitted(emission, area, instance.material);
         let mean =
             f64::from(luminance(self.mean_color(&emitted.radiance))) * f64::from(emitted.factor);
+        let mean = mean * f64::from(self.mean_opacity(emitted.mask));
         let two_sided = emitted.two_sided;
         let flux_per_area = mean * PI * if two_sided { 2.0 } else { 1.0 };
         self.table.emitted.push(Some(emitted));

@@ -206,6 +206,41 @@ impl Lights<'_> {
         }
     }
 
+    /// Whether [`Lights::is_met_by_chance`] is true of any instance.
+    pub fn has_met_by_chance(&self) -> bool {
+        (0..self.table.emitted.len() as u32).any(|instance| self.is_met_by_chance(instance))
+    }
+
+    /// Whether an instance emits of which no point can be drawn, since it has no end: paths meet it by chance alone.
+    #[inline]
+    pub fn is_met_by_chance(&self, instance: u32) -> bool {
+        let index = instance as usize;
+        self.table.emitted[index].is_some() && self.table.first_of_instance[index] == NOTHING
+    }
+
+    /// The mean radiance which leaves a surface from a point towards the unit direction `wo`: holes in it emit nothing.
+    /// Paths that were stopped there ask [`Lights::emitted`].
+    #[inline]
+    pub(super) fn sent(&self, instance: u32, surface: &SurfacePoint, wo: Vec3, time: f32) -> Rgb {
+        match &self.table.emitted[instance as usize] {
+            Some(emitted) if emitted.two_sided || surface.ng.dot(wo) > 0.0 => {
+                let at = self.geometry.texture_point(instance, surface, time);
+                self.sent_by(emitted, &at)
+            }
+            _ => Rgb::ZERO,
+        }
+    }
+
+    /// The mean radiance of a point, which may be in a hole.
+    #[inline]
+    fn sent_by(&self, emitted: &Emitted, at: &TexturePoint) -> Rgb {
+        let radiance = self.radiance_of(emitted, at);
+        match emitted.mask {
+            None => radiance,
+            Some(material) => radiance * self.materials.opacity(material, at),
+        }
+    }
+
     /// The density with which [`Lights::sample`] draws the direction from `from` to a point `q` of an
     /// emitting surface with unit normal `n`.
     pub fn pdf(
@@ -221,9 +256,13 @@ impl Lights<'_> {
         if first == NOTHING {
             return 0.0;
         }
+        // From outside the near side of a sphere is drawn; through holes in it the inside of the far one is seen.
+        let is_seen = |p: DVec3| (p - q).dot(n.as_dvec3()) > 0.0;
         let prepared = match self.shapes.of(instance) {
             ShapeLight::Rectangle(rectangle) => Some(rectangle.pdf(from.p, q)),
-            ShapeLight::Sphere(sphere) => sphere.cone(from).map(|cone| cone.pdf()),
+            ShapeLight::Sphere(sphere) => {
+                sphere.cone(from).map(|cone| if is_seen(from.p) { cone.pdf() } else { 0.0 })
+            }
             ShapeLight::Other => None,
         };
         if let Some(pdf) = prepared {
@@ -235,7 +274,8 @@ impl Lights<'_> {
         let (emitter, pdf) = match &object.geometry {
             Geometry::Primitive(shape) => {
                 let pdf = match ShapeSampling::choose(shape, &map, from) {
-                    ShapeSampling::Cone { cone } => cone.pdf(),
+                    ShapeSampling::Cone { cone } if is_seen(from.p) => cone.pdf(),
+                    ShapeSampling::Cone { .. } => 0.0,
                     ShapeSampling::Rectangle { sampler } => sampler.pdf(),
                     ShapeSampling::Area => {
                         let local = map.inverse().transform_point3(q);
@@ -370,7 +410,7 @@ impl Lights<'_> {
         let point = rectangle.sample(from.p, u);
         let wi = (point.p - from.p).try_normalize()?.as_vec3();
         let end = ShadowEnd::Surface { p: point.p, p_error: rectangle.p_error, n: rectangle.n };
-        let radiance = self.radiance_of(emitted, &TexturePoint::on(Chart::SQUARE, point.uv));
+        let radiance = self.sent_by(emitted, &TexturePoint::on(Chart::SQUARE, point.uv));
         Some(LightSample { wi, radiance, pdf: point.pdf as f32, delta: false, end })
     }
 
@@ -390,7 +430,7 @@ impl Lights<'_> {
             p_error: sphere.p_error,
             n: normal.as_vec3(),
         };
-        let radiance = self.radiance_of(emitted, &TexturePoint::at(Vec2::ZERO));
+        let radiance = self.sent_by(emitted, &TexturePoint::at(Vec2::ZERO));
         Some(LightSample { wi: wi.as_vec3(), radiance, pdf: cone.pdf() as f32, delta: false, end })
     }
 
@@ -424,7 +464,7 @@ impl Lights<'_> {
         pdf: f64,
     ) -> Option<LightSample> {
         let wi = (surface.p - from.p).try_normalize()?.as_vec3();
-        let radiance = self.emitted(instance, surface, -wi, time);
+        let radiance = self.sent(instance, surface, -wi, time);
         let end = ShadowEnd::Surface { p: surface.p, p_error: surface.p_error, n: surface.ng };
         Some(LightSample { wi, radiance, pdf: pdf as f32, delta: false, end })
     }

@@ -11,10 +11,11 @@
 //!
 //! - refraction does not scale power by `η²` ([`TransportMode::Importance`]);
 //! - where shading and geometric normal differ the BSDF is not symmetric. The adjoint is
-//!   `f* = f·(|ω_i·n_s| |ω_o·n_g|) / (|ω_i·n_g| |ω_o·n_s|)`, and a photon left at a surface counts
+//!   `f* = f·(|ω_i·n_s| |ω_o·n_g|) / (|ω_i·n_g| |ω_o·n_s|)` (`scattering.rs`), and a photon left at a surface counts
 //!   `|ω_i·n_s|/|ω_i·n_g|`, since photons arrive by the geometric cosine and light is scattered by the
 //!   shading one (Veach 1997, *Robust Monte Carlo Methods for Light Transport Simulation*, sections 5.2
-//!   and 5.3).
+//!   and 5.3). The shading normal is here the one of the shape: a bump or normal map turns it further, as finely as
+//!   who gathers sees it, and he accounts for that.
 //!
 //! Photons are left **before** it is decided whether a surface with holes stops them: what is kept is
 //! the light which arrives, and who looks at the surface decides about the hole himself. For the same
@@ -22,17 +23,19 @@
 //! drawn.
 
 use super::Photon;
+use super::scattering::Scattering;
 use crate::build::bvh::SurfacePoint;
 use crate::build::light::{Aim, EmittedPhoton, Lights, PhotonNumbers, PhotonSource};
 use crate::build::nesting::{Meeting, NestedGeometry};
 use crate::description::Rgb;
-use crate::extract::NOTHING;
-use crate::math::{Cone, Frame, Ray, offset_ray_origin};
+use crate::extract::{NOTHING, ViewCamera};
+use crate::math::{Cone, Ray, offset_ray_origin};
 use crate::sampling::{Sampler, dimension};
+use crate::shade::Bsdf;
+use crate::shade::InnerReflections;
 use crate::shade::medium::Fate;
 use crate::shade::nesting::{Inside, NestingFaults, SolidStack};
-use crate::shade::{Bsdf, BsdfSample, InnerReflections, ShadedBsdf, TransportMode};
-use glam::{Vec2, Vec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::sync::atomic::AtomicBool;
@@ -167,6 +170,28 @@ impl PhotonStore {
     }
 }
 
+/// How finely photons see textures: as finely as the camera does at that place.
+///
+/// The cone of a path which scatters is the wider the fewer its samples are; what it tends to is the cone of its pixel. Photons have
+/// that one from the start, over the straight distance to the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct TextureView<'a> {
+    /// What looks.
+    pub camera: &'a ViewCamera,
+    /// What one of its samples stands for.
+    pub pixel: Cone,
+}
+
+impl TextureView<'_> {
+    /// The ray along which the camera looks at a point, and the cone around it there.
+    fn towards(&self, p: DVec3, time: f32) -> (Ray, Cone) {
+        let (ray, distance) = self.camera.ray_to(p, time);
+        let mut cone = self.pixel;
+        cone.advance(distance);
+        (ray, cone)
+    }
+}
+
 /// Traces photons. The generic parameters are those of the path tracer.
 #[derive(Clone, Copy)]
 pub struct PhotonTracer<'a, const OPACITY: bool, I> {
@@ -182,6 +207,8 @@ pub struct PhotonTracer<'a, const OPACITY: bool, I> {
     pub storable: &'a [bool],
     /// Width α from which a rough surface is storable.
     pub min_alpha: f32,
+    /// How finely textures are seen; `None` where they are not filtered.
+    pub view: Option<TextureView<'a>>,
     /// Greatest number of surface interactions.
     pub max_depth: u32,
     /// Reflections in a row inside of a solid with bent normals after which a photon is let out.
@@ -254,6 +281,14 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
         }
     }
 
+    /// The ray along which the camera would look at a point that a photon has met, and what lies in its cone there.
+    fn seen(&self, ray: &Ray, surface: &SurfacePoint) -> (Ray, Cone) {
+        match self.view {
+            None => (*ray, Cone::default()),
+            Some(view) => view.towards(surface.p, ray.time),
+        }
+    }
+
     fn follow(
         &self,
         photon: EmittedPhoton,
@@ -308,7 +343,8 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             if self.keeps(walk.depth, caustic) && self.storable[material as usize] {
                 leave(&surface, &walk.ray, walk.power, walk.depth, caustic, &mut photons.surfaces);
             }
-            let at = geometry.texture_point(hit.instance, &surface, walk.ray.time);
+            let (seen_along, cone) = self.seen(&walk.ray, &surface);
+            let at = geometry.texture_point_in(cone, &seen_along, &hit, &surface);
             let mut roulette = None;
             if OPACITY {
                 let u = || sampler.one(dimensions + dimension::ROULETTE);
@@ -326,21 +362,20 @@ impl<const OPACITY: bool, I: Inside> PhotonTracer<'_, OPACITY, I> {
             }
             let mut lobe = sampler.one(dimensions + dimension::LOBE);
             let chosen = materials.choose(material, &at, &mut lobe);
+            let (here, storable) = materials.storable_at(chosen.material, &at, self.min_alpha);
             let (media, sides) = ((material, outside), [&mut walk.inside, &mut beyond]);
             walk.power *= self.scene.disperse(media, sides, sampler, dimension::PHOTON_WAVELENGTH);
             let nm = walk.inside.wavelength();
-            let bsdf = materials.chosen_bsdf_tuned(chosen.material, &at, outside, nm);
+            let bsdf = materials.chosen_bsdf_tuned(chosen.material, &here, outside, nm);
             if let Some(relief) = chosen.relief {
-                // What a photon stands for is not known.
-                let (turn, cone) = ((materials, relief), Cone::default());
-                geometry.turn_normal(turn, cone, &walk.ray, &hit, &mut surface, &at);
+                let turn = (materials, relief);
+                surface.ns = geometry.relief_normal(turn, cone, &seen_along, &hit, &surface, &at);
             }
-            let storable = bsdf.is_storable(self.min_alpha);
             if self.keep == Keep::Caustics && matches!(bsdf, Bsdf::Diffuse(_)) {
                 return;
             }
             let direction = sampler.two(dimensions + dimension::DIRECTION_AND_LIGHT_POINT);
-            let scattering = Scattering::new(surface, -walk.ray.d, bsdf);
+            let scattering = Scattering::new(surface, chosen.relief.is_some(), -walk.ray.d, bsdf);
             let drawn = scattering.draw(lobe, direction, &mut walk.inner);
             let Some((wi, sample, weight)) = drawn else { return };
             walk.only_specular &= sample.delta || !storable;
@@ -390,63 +425,10 @@ fn leave(
     photons: &mut Vec<Photon>,
 ) {
     let wi = -ray.d;
-    let (cos_g, cos_s) = (wi.dot(surface.ng), wi.dot(surface.ns));
     // Where the two normals disagree about the side, camera paths use the geometric one.
-    let share = if cos_g * cos_s > 0.0 { cos_s / cos_g } else { 1.0 };
-    let power = power * share;
+    let power = power * (wi.dot(surface.normal_seen_from(wi)) / wi.dot(surface.ng));
     if power.is_finite() && power != Rgb::ZERO {
         let position = surface.p.as_vec3();
         photons.push(Photon::new(position, power, wi, surface.ng, depth, caustic));
-    }
-}
-
-/// A surface which scatters a photon.
-struct Scattering<'a> {
-    surface: SurfacePoint,
-    frame: Frame,
-    wo: Vec3,
-    bsdf: Bsdf<'a>,
-}
-
-impl<'a> Scattering<'a> {
-    fn new(mut surface: SurfacePoint, wo: Vec3, bsdf: Bsdf<'a>) -> Self {
-        // Seen from beyond its horizon a shading normal cannot say what is reflected where.
-        if wo.dot(surface.ns) * wo.dot(surface.ng) <= 0.0 {
-            surface.ns = surface.ng;
-        }
-        Self { surface, frame: surface.frame(), wo, bsdf }
-    }
-
-    fn crosses(&self, wi: Vec3) -> bool {
-        let ng = self.surface.ng;
-        (wi.dot(ng) > 0.0) != (self.wo.dot(ng) > 0.0)
-    }
-
-    /// Draws where the photon goes on, with the factor on its power.
-    fn draw(
-        &self,
-        lobe: f32,
-        u: Vec2,
-        inner: &mut InnerReflections,
-    ) -> Option<(Vec3, BsdfSample, Rgb)> {
-        let Self { surface, frame, wo, bsdf } = self;
-        let shaded = ShadedBsdf { bsdf, frame, ng: surface.ng, wo: *wo };
-        let (wi, sample) = shaded.sample(lobe, u, TransportMode::Importance, inner)?;
-        if inner.was_let_out() {
-            return Some((wi, sample, sample.weight));
-        }
-        // What is thrown back counts as it was drawn: its height above the surface is the same.
-        let drawn = frame.from_local(sample.wi);
-        Some((wi, sample, sample.weight * self.adjoint(drawn)))
-    }
-
-    /// `f*/f`.
-    fn adjoint(&self, wi: Vec3) -> f32 {
-        let SurfacePoint { ng, ns, .. } = self.surface;
-        if ng == ns {
-            return 1.0;
-        }
-        let ratio = (self.wo.dot(ns) * wi.dot(ng)) / (self.wo.dot(ng) * wi.dot(ns));
-        if ratio.is_finite() { ratio.abs() } else { 0.0 }
     }
 }

@@ -75,12 +75,6 @@ pub struct RoughConductor<'t> {
 }
 
 impl<'t> RoughConductor<'t> {
-    /// Width of the microfacets.
-    #[inline]
-    pub(super) fn alpha(&self) -> f32 {
-        self.lobe.ggx().alpha
-    }
-
     /// `average` is the cosine-weighted mean of `fresnel`.
     pub(crate) fn new(fresnel: ConductorFresnel, average: Rgb, lobe: ReflectorLobe<'t>) -> Self {
         Self { fresnel, lobe, returned: lobe.returned_share(average) }

@@ -253,22 +253,6 @@ impl Bsdf<'_> {
         }
     }
 
-    /// Whether it scatters into so many directions that photons found at a point tell what it looks
-    /// like: it has a diffuse lobe, or one at least as wide as `min_alpha`.
-    #[inline]
-    pub fn is_storable(&self, min_alpha: f32) -> bool {
-        match self {
-            Self::Diffuse(_) | Self::SmoothPlastic(_) | Self::RoughPlastic(_) => true,
-            Self::Mirror(_)
-            | Self::SmoothDielectric(_)
-            | Self::ThinGlass(_)
-            | Self::SmoothConductor(_) => false,
-            Self::RoughDielectric(bsdf) => bsdf.alpha() >= min_alpha,
-            Self::RoughConductor(bsdf) => bsdf.alpha() >= min_alpha,
-            Self::Principled(bsdf) => bsdf.is_storable(min_alpha),
-        }
-    }
-
     /// Whether light from the other side can come through.
     #[inline]
     pub fn transmits(&self) -> bool {

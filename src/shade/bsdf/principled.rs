@@ -91,12 +91,6 @@ impl<'t> Principled<'t> {
         self.lobe.is_some() || self.diffuse != Rgb::ZERO
     }
 
-    /// [`Bsdf::is_storable`](super::Bsdf::is_storable).
-    #[inline]
-    pub(super) fn is_storable(&self, min_alpha: f32) -> bool {
-        self.diffuse != Rgb::ZERO || self.lobe.is_some_and(|lobe| lobe.ggx().alpha >= min_alpha)
-    }
-
     /// `(1 − E, B)` of the gloss at `mu`: its albedo for any `F₀` is `F₀ (E − B) + B`.
     #[inline]
     fn gloss(&self, mu: f32) -> (f32, f32) {

@@ -61,12 +61,6 @@ impl<'t> RoughDielectric<'t> {
         self.tint
     }
 
-    /// Width of the microfacets.
-    #[inline]
-    pub(super) fn alpha(&self) -> f32 {
-        self.lost.alpha()
-    }
-
     /// * `eta` — index inside over outside.
     /// * `lost` — the table of single-bounce losses made for `eta`, at the width wanted.
     /// * `average` — mean reflectance of the smooth interface from outside.

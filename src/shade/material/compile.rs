@@ -96,6 +96,11 @@ impl Width {
         }
     }
 
+    /// Whether it depends on the place.
+    pub(super) fn is_textured(self) -> bool {
+        matches!(self, Self::Texture(_))
+    }
+
     /// Bounds of the width over the surface; a texture may ask for any.
     pub(super) fn narrowest(self) -> f32 {
         if let Self::Constant(alpha) = self { alpha } else { 0.0 }

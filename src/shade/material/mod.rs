@@ -26,7 +26,7 @@ use crate::extract::NOTHING;
 use crate::math::{GraphFault, parts_first};
 use compile::{Kind, MetalColor};
 use relief::Relief;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// All materials of a frame and the textures which they read.
 ///
@@ -388,6 +388,35 @@ impl MaterialTable {
         false
     }
 
+    /// About the mean of [`MaterialTable::opacity`] over a surface, to choose lamps by; above 0 where any of it may be.
+    pub fn mean_opacity(&self, material: u32) -> f32 {
+        self.mean_opacity_once(material, &mut HashMap::new())
+    }
+
+    /// [`MaterialTable::mean_opacity`], computed of each part once.
+    fn mean_opacity_once(&self, material: u32, known: &mut HashMap<u32, f32>) -> f32 {
+        if let Some(&mean) = known.get(&material) {
+            return mean;
+        }
+        let mean = |value: &Value<f32, u32>| match *value {
+            Value::Constant(number) => number.clamp(0.0, 1.0),
+            Value::Texture(texture) => self.textures.mean_share(texture),
+        };
+        let opacity = match &self.materials[material as usize].kind {
+            Kind::Masked { material, opacity } => {
+                mean(opacity) * self.mean_opacity_once(*material, known)
+            }
+            Kind::Mix { a, b, amount } => {
+                let (a, b) = (self.mean_opacity_once(*a, known), self.mean_opacity_once(*b, known));
+                a + (b - a) * mean(amount)
+            }
+            Kind::Relief { material } => self.mean_opacity_once(*material, known),
+            _ => 1.0,
+        };
+        known.insert(material, opacity);
+        opacity
+    }
+
     /// Whether a surface stops a ray: `None` where it passes through a hole.
     ///
     /// One number decides that and, stretched back to the whole interval `[0, 1)`, is left for another
@@ -413,7 +442,48 @@ impl MaterialTable {
         self.materials[material as usize].has_opacity
     }
 
-    /// Whether [`Bsdf::is_storable`] can be true of a point of the material.
+    /// Whether photons are gathered at a point of a material that is made of no other: whether it scatters into so many
+    /// directions there that photons tell what it looks like, by a diffuse lobe or one at least as wide as `min_alpha`. Beside
+    /// that, where its textures are to be looked up.
+    ///
+    /// Photons and camera paths must agree about every place, or light is counted twice or not at all; but each
+    /// sees another footprint of it. So where textures decide, they are looked up at the point itself, whoever asks and
+    /// whatever the filter, and so is all else of the material: its lobes are those of the place.
+    #[inline]
+    pub fn storable_at(
+        &self,
+        material: u32,
+        at: &TexturePoint,
+        min_alpha: f32,
+    ) -> (TexturePoint, bool) {
+        let wide = |width, at| self.alpha(width, at).is_some_and(|alpha| alpha >= min_alpha);
+        match &self.materials[material as usize].kind {
+            Kind::Diffuse { .. } | Kind::Plastic { .. } => (*at, true),
+            Kind::Mirror { .. } | Kind::ThinGlass { .. } => (*at, false),
+            Kind::Dielectric { width, .. } | Kind::Conductor { width, .. } => {
+                let at = if width.is_textured() { at.unfiltered() } else { *at };
+                (at, wide(*width, &at))
+            }
+            Kind::Principled { base_color, metallic, width, transmission, .. } => {
+                let textured = |value: &Value<f32, u32>| matches!(value, Value::Texture(_));
+                // Whether it is black at some place says nothing about the others.
+                let black = *base_color == Value::Constant(Rgb::ZERO);
+                let bare = |value: &Value<f32, u32>| *value == Value::Constant(1.0);
+                let diffuse = !(black || bare(metallic) || bare(transmission));
+                let decides = (diffuse && (textured(metallic) || textured(transmission)))
+                    || (!diffuse && width.is_textured());
+                let at = if decides { at.unfiltered() } else { *at };
+                let below_one = |value: &Value<f32, u32>| self.scalar(value, &at) < 1.0;
+                let diffuse = diffuse && below_one(metallic) && below_one(transmission);
+                (at, diffuse || wide(*width, &at))
+            }
+            Kind::Mix { .. } | Kind::Masked { .. } | Kind::Relief { .. } => {
+                unreachable!("a material was chosen")
+            }
+        }
+    }
+
+    /// Whether [`MaterialTable::storable_at`] can be true of a point of the material.
     pub fn may_be_storable(&self, material: u32, min_alpha: f32) -> bool {
         self.any_part(material, |kind| match kind {
             Kind::Diffuse { .. } | Kind::Plastic { .. } | Kind::Principled { .. } => true,

@@ -119,6 +119,20 @@ impl TextureNeeds {
     }
 }
 
+/// Points over the unit square at which textures are looked up for a mean.
+const UNIT_POINTS: u32 = UNIT_SIDE * UNIT_SIDE;
+const UNIT_SIDE: u32 = 32;
+
+/// The middles of a grid over the unit square, each standing for its field.
+fn unit_square() -> impl Iterator<Item = TexturePoint> {
+    (0..UNIT_POINTS).map(|k| {
+        let uv = Vec2::new((k % UNIT_SIDE) as f32 + 0.5, (k / UNIT_SIDE) as f32 + 0.5);
+        let uv = uv / UNIT_SIDE as f32;
+        let axes = [Vec2::X, Vec2::Y].map(|axis| axis / UNIT_SIDE as f32);
+        TexturePoint { p: uv.extend(0.0).as_dvec3(), axes, ..TexturePoint::at(uv) }
+    })
+}
+
 /// All textures of a frame.
 #[derive(Clone, Debug, Default)]
 pub struct Textures {
@@ -307,7 +321,6 @@ impl Textures {
     /// Mean colour of a texture over the unit square: for the power of a textured light. Exact for images and
     /// what is filtered in closed form; of a solid texture that of a slice through it.
     pub fn average(&self, index: u32) -> Rgb {
-        const N: u32 = 32;
         if let Texture::Spectrum { values, scale } = &self.list[index as usize] {
             // Of a colour outside of the gamut all channels count.
             return (color_of(values) * *scale).abs();
@@ -315,14 +328,15 @@ impl Textures {
         if let Texture::Image { file, .. } = &self.list[index as usize] {
             return image::average(&file.base);
         }
-        let mut sum = Rgb::ZERO;
-        for k in 0..N * N {
-            let uv = Vec2::new((k % N) as f32 + 0.5, (k / N) as f32 + 0.5) / N as f32;
-            let axes = [Vec2::X, Vec2::Y].map(|axis| axis / N as f32);
-            let p = uv.extend(0.0).as_dvec3();
-            sum += self.color(index, &TexturePoint { p, axes, ..TexturePoint::at(uv) });
-        }
-        sum / (N * N) as f32
+        unit_square().map(|at| self.color(index, &at)).sum::<Rgb>() / UNIT_POINTS as f32
+    }
+
+    /// About the mean of a texture of shares over the unit square, for the power of a light with holes: strictly between 0 and
+    /// 1, since there may be more than was looked at.
+    pub fn mean_share(&self, index: u32) -> f32 {
+        let sum: f32 = unit_square().map(|at| self.scalar(index, &at).clamp(0.0, 1.0)).sum();
+        let least = (UNIT_POINTS as f32).recip();
+        (sum / UNIT_POINTS as f32).clamp(least, 1.0 - least)
     }
 
     #[inline]

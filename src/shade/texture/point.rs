@@ -50,6 +50,12 @@ impl TexturePoint {
         }
     }
 
+    /// The same point, of which a sample stands for itself alone: textures are not filtered there.
+    #[must_use]
+    pub fn unfiltered(&self) -> Self {
+        Self { axes: [Vec2::ZERO; 2], width: 0.0, ..*self }
+    }
+
     /// A place inside a solid at a time in the shutter: x and y stand for uv.
     pub fn inside(p: DVec3, time: f32) -> Self {
         Self { p, time, is_inside: true, ..Self::at(p.truncate().as_vec2()) }
