@@ -56,18 +56,19 @@ fn a_mesh_whose_plane_goes_through_the_camera_is_lit_as_the_cosine_law_says() {
     }
 }
 
-/// Oracle: the rectangle at the same place. A lamp whose plane goes through the camera lights a wall by photons.
+/// Oracle: the rectangle at the same place. A lamp whose plane goes through the camera lights a floor by photons, most of which
+/// leave it at a slant.
 #[test]
 fn photons_leave_a_mesh_as_they_leave_a_rectangle() {
     let lit = |shape: &str| {
         let text = format!(
             r#"(
-            render: (max_depth: 1, integrator: Sppm, filter: Box(), photons: (per_pass: 20000, direct: Photons)),
-            materials: {{"wall": Diffuse(albedo: (0.5, 0.5, 0.5))}},
+            render: (max_depth: 1, integrator: Sppm, filter: Box(), photons: (per_pass: Some(20000), direct: Photons)),
+            materials: {{"floor": Diffuse(albedo: (0.5, 0.5, 0.5))}},
             meshes: {{ {} }},
             entities: {{
-                "camera": (transform: (translation: (2, 0, 0), look_at: (0, 0, 1)), camera: (fov: 20)),
-                "wall": (transform: (translation: (0, 0, 1), rotation: (180, 0, 0)), shape: Rectangle(size: (4, 4)), material: "wall"),
+                "camera": (transform: (translation: (0.9, 1, 0), look_at: (0.3, -0.6, 0.5)), camera: (fov: 40)),
+                "floor": (transform: (translation: (0, -0.6, 0), rotation: (-90, 0, 0)), shape: Rectangle(size: (4, 4)), material: "floor"),
                 "lamp": (shape: {shape}, emission: Radiance((1, 1, 1))),
             }})"#,
             mesh_text("square", &square()),
@@ -77,7 +78,7 @@ fn photons_leave_a_mesh_as_they_leave_a_rectangle() {
     let (mesh, rectangle) = (lit("Mesh(\"square\")"), lit("Rectangle()"));
     let difference = (mesh.mean / rectangle.mean - 1.0).abs();
     let error = (mesh.error + rectangle.error) / rectangle.mean;
-    assert!(difference <= 3.0 * error && error < 0.01, "{mesh:?} for {rectangle:?}");
+    assert!(difference <= 3.0 * error && error < 0.02, "{mesh:?} for {rectangle:?}");
 }
 
 /// A coarse ball with the normals of the sphere, in one sun.
