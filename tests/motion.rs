@@ -368,3 +368,50 @@ fn growth_over_the_shutter_is_blurred_too() {
         );
     }
 }
+
+/// Oracle: the integral of the track by hand, 1 for every one of them; the shutter is one second.
+#[test]
+fn flashes_and_jumps_of_a_lamp_within_the_shutter_are_not_missed() {
+    let triangle = |width: f64| {
+        let (a, b) = (0.371 - 0.5 * width, 0.371 + 0.5 * width);
+        format!("(keys: [({a}, 0), (0.371, {}), ({b}, 0)])", 2.0 / width)
+    };
+    let step = |width: f64| {
+        let (a, b) = (0.371 - 0.5 * width, 0.371 + 0.5 * width);
+        format!("(interpolation: Step, keys: [(0, 0), ({a}, {}), ({b}, 0)])", 1.0 / width)
+    };
+    let mut tracks = vec!["(interpolation: Step, keys: [(-1, 0), (0.5, 2)])".to_owned()];
+    for width in [0.5, 0.05, 0.01, 0.001] {
+        tracks.extend([triangle(width), step(width)]);
+    }
+    for track in tracks {
+        let lamp = format!(
+            r#""lamp": (shape: Rectangle(size: (9, 9)), {GLOW}, keyframes: (emission: {track}))"#
+        );
+        let seen = render(&before_camera(3, &lamp), (3, 3), 4).mean().mean;
+        assert!((seen - 1.0).abs() < 1e-6, "{track}: {seen}");
+    }
+}
+
+/// Oracle: a lens that jumps at half the shutter shows either view for half the time: the corner of the picture sees the
+/// emitter with the narrow one alone. Something that is away for a hundredth of the shutter is there for the rest.
+#[test]
+fn what_jumps_within_the_shutter_jumps_at_its_key() {
+    let text = format!(
+        r#"(
+        clock: (fps: 1, shutter: (0, 1)),
+        render: (filter: Box(), max_depth: 1),
+        entities: {{
+            "camera": (camera: (), keyframes: (fov: (interpolation: Step, keys: [(0, 20), (0.5, 60)]))),
+            "lamp": (transform: (translation: (0, 0, -2)), shape: Rectangle(size: (1, 1)), {GLOW}),
+        }})"#
+    );
+    let corner = render(&text, (9, 9), 1024).mean_where(|x, y| x == 0 && y == 0).mean;
+    assert!((corner - 0.5).abs() < 2e-3, "{corner}");
+    let away = format!(
+        r#""lamp": (shape: Rectangle(size: (9, 9)), {GLOW}, keyframes: (translation: (interpolation: Step, keys: [
+            (0, (0, 0, 0)), (0.62, (90, 0, 0)), (0.63, (0, 0, 0))])))"#
+    );
+    let seen = render(&before_camera(3, &away), (3, 3), 4096).mean_where(|x, _| x == 1).mean;
+    assert!((seen - 0.99).abs() < 2e-3, "{seen}");
+}

@@ -490,7 +490,7 @@ fn images_end_where_the_coordinates_of_a_shape_end() {
             r#"(
     render: (filter: Box(radius: 0.5), max_depth: 1),
     textures: {{ "rows": Checker() }},
-    meshes: {{ "ball": Tessellated(shape: Sphere(), tolerance: 0.0001) }},
+    meshes: {{ "ball": Tessellated(shape: Sphere(), tolerance: 0.01) }},
     entities: {{
         "camera": (transform: ({from}), camera: ({lens})),
         "thing": ({thing}),

@@ -11,6 +11,9 @@ pub struct Camera<R> {
     /// Vertical field of view in degrees, in `(0, 180)`. Not used by an orthographic camera.
     #[serde(default = "default_fov")]
     pub fov: f64,
+    /// Horizontal field of view in degrees, in `(0, 180)`. Excludes `fov`.
+    #[serde(default)]
+    pub fov_x: Option<f64>,
     /// Height of the visible field in metres; makes the camera orthographic.
     #[serde(default)]
     pub orthographic: Option<f64>,
@@ -72,6 +75,7 @@ impl<R> Default for Camera<R> {
     fn default() -> Self {
         Self {
             fov: default_fov(),
+            fov_x: None,
             orthographic: None,
             aperture: 0.0,
             f_number: None,
@@ -83,6 +87,13 @@ impl<R> Default for Camera<R> {
 }
 
 impl<R> Camera<R> {
+    /// The vertical field of view in degrees in a picture of this width and height.
+    pub fn vertical_fov(&self, (width, height): (u32, u32)) -> f64 {
+        let Some(fov_x) = self.fov_x else { return self.fov };
+        let tan = (0.5 * fov_x.to_radians()).tan() * f64::from(height) / f64::from(width);
+        2.0 * tan.atan().to_degrees()
+    }
+
     /// Radius of the lens in metres for the vertical field of view `fov_deg`.
     ///
     /// With an f-number `N` the focal length is `f = h / (2 tan(fov/2))`, `h` the height of the
@@ -106,6 +117,7 @@ impl<R> Camera<R> {
         };
         Ok(Camera {
             fov: self.fov,
+            fov_x: self.fov_x,
             orthographic: self.orthographic,
             aperture: self.aperture,
             f_number: self.f_number,
@@ -118,4 +130,19 @@ impl<R> Camera<R> {
 
 fn default_fov() -> f64 {
     40.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Oracle: a square picture has one field of view, and 90° across 2:1 are 2·atan(½) up.
+    #[test]
+    fn a_horizontal_field_of_view_follows_the_picture() {
+        let camera = Camera::<()> { fov_x: Some(90.0), ..Camera::default() };
+        assert!((camera.vertical_fov((100, 100)) - 90.0).abs() < 1e-12);
+        assert!((camera.vertical_fov((200, 100)) - 53.130_102_354_155_98).abs() < 1e-12);
+        assert!((camera.vertical_fov((100, 200)) - 126.869_897_645_844_02).abs() < 1e-12);
+        assert!((Camera::<()>::default().vertical_fov((7, 3)) - 40.0).abs() < f64::EPSILON);
+    }
 }

@@ -1,8 +1,8 @@
 //! Where things are and how they move: plain data, evaluated by the step stage.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
-/// A pose relative to the parent: first scale, then rotation, then translation.
+/// A pose relative to the parent: first stretch, then scale, then rotation, then translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform {
     /// Metres.
@@ -11,11 +11,18 @@ pub struct Transform {
     pub rotation: DQuat,
     /// Factor along each local axis; negative mirrors, 0 is not allowed for shapes.
     pub scale: DVec3,
+    /// A symmetric map, the identity unless the pose was given as a matrix: what that is beside a rotation.
+    pub stretch: DMat3,
 }
 
 impl Default for Transform {
     fn default() -> Self {
-        Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+        Self {
+            translation: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            scale: DVec3::ONE,
+            stretch: DMat3::IDENTITY,
+        }
     }
 }
 

@@ -6,9 +6,9 @@
 //! *Physically Based Rendering*, 4th ed., section 5.2.3).
 
 use crate::description::Focus;
-use crate::math::{Aabb, MotionTransform, Ray};
+use crate::math::{Aabb, MotionTransform, Ray, TimeCurve};
 use crate::sampling::warp::{square_to_disk, square_to_polygon};
-use crate::step::merge_equal;
+use crate::step::ROUNDING;
 use crate::world::{ActiveCamera, Camera, LookAt, Optics, Settings, ShutterMotion};
 use bevy_ecs::prelude::*;
 use glam::{DMat4, DVec2, DVec3, Vec2};
@@ -27,10 +27,10 @@ pub struct ViewCamera {
     /// Width and height of the picture in pixels.
     pub size: (u32, u32),
     pub(super) projection: Projection,
-    /// Radius of the lens in metres, at the times of the field of view.
-    pub(super) lens_radius: Vec<f64>,
-    /// Axial distance of the plane in focus, at evenly spaced times; infinite for parallel rays.
-    pub(super) focus: Vec<f64>,
+    /// Radius of the lens in metres.
+    pub(super) lens_radius: TimeCurve,
+    /// Axial distance of the plane in focus; infinite for parallel rays.
+    pub(super) focus: TimeCurve,
     pub(super) blades: u32,
     pub(super) blade_rotation: f64,
     /// What the user should know about this camera.
@@ -41,8 +41,8 @@ pub struct ViewCamera {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Projection {
-    /// Tangent of half the vertical field of view, at evenly spaced times.
-    Perspective { tan_half_fov: Vec<f64> },
+    /// Tangent of half the vertical field of view.
+    Perspective { tan_half_fov: TimeCurve },
     /// Half the height of the field in metres.
     Orthographic { half_height: f64 },
 }
@@ -53,9 +53,9 @@ impl Default for ViewCamera {
             motion: MotionTransform::new(&[]),
             world_to_camera: DMat4::IDENTITY,
             size: (1, 1),
-            projection: Projection::Perspective { tan_half_fov: vec![1.0] },
-            lens_radius: vec![0.0],
-            focus: vec![f64::INFINITY],
+            projection: Projection::Perspective { tan_half_fov: TimeCurve::constant(1.0) },
+            lens_radius: TimeCurve::constant(0.0),
+            focus: TimeCurve::constant(f64::INFINITY),
             blades: 0,
             blade_rotation: 0.0,
             warning: None,
@@ -73,34 +73,19 @@ pub struct CameraRay {
     pub axis: DVec3,
 }
 
-/// The value at time `u` of keys at evenly spaced times in `[0, 1]`, joined by straight lines.
-pub(super) fn at(keys: &[f64], u: f64) -> f64 {
-    match keys {
-        [] => f64::INFINITY,
-        [key] => *key,
-        keys => {
-            let position = u * (keys.len() - 1) as f64;
-            let k = (position as usize).min(keys.len() - 2);
-            let s = position - k as f64;
-            // An end of a segment is met exactly, also when the other end is infinite.
-            if s == 0.0 { keys[k] } else { keys[k] * (1.0 - s) + keys[k + 1] * s }
-        }
-    }
-}
-
 impl ViewCamera {
     /// Whether camera rays need a point on a lens.
     pub fn has_lens(&self) -> bool {
-        self.lens_radius.iter().any(|&radius| radius > 0.0)
+        self.lens_radius.values().any(|radius| radius > 0.0)
     }
 
     /// Whether the camera is the same during the whole shutter. A pinhole has no focus to change.
     pub fn is_static(&self) -> bool {
         let zooms = match &self.projection {
-            Projection::Perspective { tan_half_fov } => tan_half_fov.len() > 1,
+            Projection::Perspective { tan_half_fov } => !tan_half_fov.is_constant(),
             Projection::Orthographic { .. } => false,
         };
-        let refocuses = self.has_lens() && self.focus.len() > 1;
+        let refocuses = self.has_lens() && !self.focus.is_constant();
         self.motion.is_static() && !zooms && !refocuses
     }
 
@@ -109,7 +94,7 @@ impl ViewCamera {
     pub fn reach(&self) -> Aabb {
         const TIMES: u16 = 8;
         let aspect = f64::from(self.size.0) / f64::from(self.size.1);
-        let radius = self.lens_radius.iter().copied().fold(0.0, f64::max);
+        let radius = self.lens_radius.values().fold(0.0, f64::max);
         let half = match &self.projection {
             Projection::Perspective { .. } => DVec2::ZERO,
             Projection::Orthographic { half_height } => {
@@ -127,7 +112,7 @@ impl ViewCamera {
     /// The ray through the film point `film` (pixels, x right, y down, (0, 0) the corner of the upper
     /// left pixel) and the lens point drawn by `lens` in `[0, 1)²`, at `time` in `[0, 1]`.
     pub fn ray(&self, film: DVec2, lens: Vec2, time: f32) -> CameraRay {
-        let radius = at(&self.lens_radius, f64::from(time));
+        let radius = self.lens_radius.at(f64::from(time));
         let on_lens = if radius > 0.0 { self.lens_point(lens) * radius } else { DVec2::ZERO };
         self.ray_from(film, on_lens, time)
     }
@@ -145,7 +130,7 @@ impl ViewCamera {
         let plane = DVec2::new(2.0 * film.x - width, height - 2.0 * film.y) / height;
         let (origin, direction) = match &self.projection {
             Projection::Perspective { tan_half_fov } => {
-                (DVec3::ZERO, (plane * at(tan_half_fov, u)).extend(-1.0))
+                (DVec3::ZERO, (plane * tan_half_fov.at(u)).extend(-1.0))
             }
             Projection::Orthographic { half_height } => {
                 ((plane * *half_height).extend(0.0), DVec3::NEG_Z)
@@ -155,7 +140,7 @@ impl ViewCamera {
             (origin, direction)
         } else {
             let on_lens = on_lens.extend(0.0);
-            let focus = at(&self.focus, u);
+            let focus = self.focus.at(u);
             // direction.z = −1: the point in focus is focus·direction. Divided by focus, so that an
             // infinite distance gives parallel rays.
             (origin + on_lens, direction - on_lens / focus)
@@ -184,7 +169,7 @@ impl ViewCamera {
         let height = f64::from(self.size.1);
         match &self.projection {
             Projection::Perspective { tan_half_fov } => {
-                (0.0, 2.0 * at(tan_half_fov, f64::from(time)) / height)
+                (0.0, 2.0 * tan_half_fov.at(f64::from(time)) / height)
             }
             Projection::Orthographic { half_height } => (2.0 * half_height / height, 0.0),
         }
@@ -226,7 +211,7 @@ impl ViewCamera {
                 if q.z >= 0.0 {
                     return None;
                 }
-                q.truncate() / (-q.z * at(tan_half_fov, f64::from(time)))
+                q.truncate() / (-q.z * tan_half_fov.at(f64::from(time)))
             }
             Projection::Orthographic { half_height } => q.truncate() / *half_height,
         };
@@ -262,18 +247,20 @@ pub fn extract_camera(
             key
         })
         .collect();
-    let default_fov = [camera.fov];
-    let fov_deg = optics.map_or(&default_fov[..], |o| &o.fov_deg);
+    let fov_deg = optics.map_or_else(
+        || TimeCurve::constant(camera.vertical_fov(settings.0.size)),
+        |optics| optics.fov_deg.clone(),
+    );
     let mut warning = None;
-    let focus = match (optics.filter(|o| !o.focus.is_empty()), camera.focus, look_at) {
-        (Some(optics), _, _) => optics.focus.clone(),
-        (None, Some(Focus::Distance(metres)), _) => vec![metres],
+    let keyed = optics.and_then(|optics| optics.focus.clone());
+    let focus = match (keyed, camera.focus, look_at) {
+        (Some(focus), _, _) => focus,
+        (None, Some(Focus::Distance(metres)), _) => TimeCurve::constant(metres),
         (None, Some(Focus::Entity(target)), _) => {
-            let target = targets.get(target).map(|t| t.keys.as_slice()).unwrap_or_default();
-            axial_distances(&motion.keys, target)
+            axial_distances(motion, targets.get(target).unwrap_or(&ShutterMotion::default()))
         }
-        (None, None, Some(aim)) => vec![(aim.target - here).length()],
-        (None, None, None) => vec![f64::INFINITY],
+        (None, None, Some(aim)) => TimeCurve::constant((aim.target - here).length()),
+        (None, None, None) => TimeCurve::constant(f64::INFINITY),
     };
     let dangling = match camera.focus {
         Some(Focus::Entity(target)) if !targets.contains(target) => {
@@ -281,19 +268,19 @@ pub fn extract_camera(
         }
         _ => None,
     };
-    let lens_radius: Vec<f64> = fov_deg.iter().map(|&fov| camera.lens_radius(fov)).collect();
-    if lens_radius.iter().any(|&r| r > 0.0) && focus.iter().any(|&f| f <= 0.0) {
+    let lens_radius = fov_deg.map(|fov| camera.lens_radius(fov));
+    if lens_radius.values().any(|r| r > 0.0) && focus.values().any(|f| f <= 0.0) {
         warning = Some("the camera is focused on something behind it: nothing is sharp".to_owned());
     }
     let projection = match camera.orthographic {
         Some(height) => Projection::Orthographic { half_height: 0.5 * height },
         None => Projection::Perspective {
-            tan_half_fov: fov_deg.iter().map(|fov| (fov.to_radians() * 0.5).tan()).collect(),
+            tan_half_fov: fov_deg.map(|fov| (fov.to_radians() * 0.5).tan()),
         },
     };
     origin.set_if_neq(FrameOrigin(here));
     view.set_if_neq(ViewCamera {
-        motion: MotionTransform::new(&moved),
+        motion: MotionTransform::through(&moved, motion.curved),
         world_to_camera: DMat4::from(*opening).inverse(),
         size: settings.0.size,
         projection,
@@ -308,12 +295,12 @@ pub fn extract_camera(
 
 /// Distances along the camera's axis to the origin of a target, over the shutter; one where all are the same but for
 /// the rounding of the places that they are between: a target may spin, or go across the axis.
-fn axial_distances(camera: &[glam::DAffine3], target: &[glam::DAffine3]) -> Vec<f64> {
+fn axial_distances(camera: &ShutterMotion, target: &ShutterMotion) -> TimeCurve {
     const SEGMENTS: usize = 16;
-    let (camera, target) = (MotionTransform::new(camera), MotionTransform::new(target));
+    let [camera, target] = [camera, target].map(|m| MotionTransform::through(&m.keys, m.curved));
     let segments = if camera.is_static() && target.is_static() { 0 } else { SEGMENTS };
     let mut reach = 0.0_f64;
-    let mut distances: Vec<f64> = (0..=segments)
+    let distances: Vec<f64> = (0..=segments)
         .map(|k| {
             let u = if segments == 0 { 0.0 } else { k as f32 / segments as f32 };
             let m = camera.at(u);
@@ -323,8 +310,7 @@ fn axial_distances(camera: &[glam::DAffine3], target: &[glam::DAffine3]) -> Vec<
             (target - m.translation).dot(axis)
         })
         .collect();
-    merge_equal(&mut distances, reach);
-    distances
+    TimeCurve::even(&distances).merged(ROUNDING * reach)
 }
 
 #[cfg(test)]
@@ -335,7 +321,7 @@ mod tests {
     use crate::world::{ChildOf, FrameClock, Keyframes, Transform, Velocity};
 
     fn camera(fov_deg: f64, size: (u32, u32)) -> ViewCamera {
-        let tan_half_fov = vec![(fov_deg.to_radians() * 0.5).tan()];
+        let tan_half_fov = TimeCurve::constant((fov_deg.to_radians() * 0.5).tan());
         ViewCamera {
             size,
             projection: Projection::Perspective { tan_half_fov },
@@ -359,8 +345,8 @@ mod tests {
     #[test]
     fn the_thin_lens_blurs_by_its_formula() {
         let mut camera = camera(40.0, (1920, 1080));
-        camera.lens_radius = vec![0.05];
-        camera.focus = vec![4.0];
+        camera.lens_radius = TimeCurve::constant(0.05);
+        camera.focus = TimeCurve::constant(4.0);
         for (z, diameter) in [(8.0, 18.545_472_6), (2.0, 37.090_945_2)] {
             // The film points whose ray through the lens point l meets (0, 0, −z): by bisection.
             let mut widest = 0.0_f64;
@@ -378,9 +364,9 @@ mod tests {
             assert!((2.0 * widest / diameter - 1.0).abs() < 1e-3, "{widest}");
         }
         // a far focus is an infinite one
-        camera.focus = vec![1e30];
+        camera.focus = TimeCurve::constant(1e30);
         let near = camera.ray(DVec2::new(3.0, 7.0), Vec2::new(0.9, 0.2), 0.0);
-        camera.focus = vec![f64::INFINITY];
+        camera.focus = TimeCurve::constant(f64::INFINITY);
         assert_eq!(near, camera.ray(DVec2::new(3.0, 7.0), Vec2::new(0.9, 0.2), 0.0));
     }
 

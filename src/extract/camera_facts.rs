@@ -1,7 +1,7 @@
 //! The camera of a frame as files tell it to other programs.
 
 use super::FrameOrigin;
-use super::camera::{Projection, ViewCamera, at};
+use super::camera::{Projection, ViewCamera};
 use crate::description::SENSOR_HEIGHT;
 use glam::{DAffine3, DMat4, DVec4};
 use serde::{Deserialize, Serialize};
@@ -60,16 +60,16 @@ impl CameraFacts {
 impl CameraState {
     fn new(camera: &ViewCamera, world_to_camera: DMat4, u: f64) -> Self {
         let aspect = f64::from(camera.size.0) / f64::from(camera.size.1);
-        let lens_radius = at(&camera.lens_radius, u);
+        let lens_radius = camera.lens_radius.at(u);
         let (half_height, tan) = match &camera.projection {
             Projection::Perspective { tan_half_fov } => {
-                let tan = at(tan_half_fov, u);
+                let tan = tan_half_fov.at(u);
                 (tan, Some(tan))
             }
             Projection::Orthographic { half_height } => (*half_height, None),
         };
         let degrees = |tan: f64| 2.0 * tan.atan().to_degrees();
-        let focus = at(&camera.focus, u);
+        let focus = camera.focus.at(u);
         Self {
             world_to_camera: world_to_camera.to_cols_array(),
             fov_deg: tan.map(|tan| (degrees(tan * aspect), degrees(tan))),

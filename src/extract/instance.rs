@@ -117,7 +117,7 @@ pub(super) fn placed(
         return None;
     }
     let place = Place { translation: motion.keys.first()?.translation, bounds };
-    let motion = MotionTransform::new(&keys);
+    let motion = MotionTransform::through(&keys, motion.curved);
     let bounds = match geometry {
         Geometry::Primitive(Primitive::Plane) => bounds,
         _ => swept_bounds(&bounds, &motion, 0.0, 1.0),
@@ -172,7 +172,7 @@ mod tests {
                 DQuat::from_scaled_axis(DVec3::new(a.sin(), a.cos(), 0.3)),
                 DVec3::new(a * 1e3, 2.0, -a),
             );
-            let motion = ShutterMotion { keys: vec![key] };
+            let motion = ShutterMotion { keys: vec![key], curved: false };
             let shapes =
                 [Shape::Sphere { radius: 0.3 }, Shape::Plane {}, Shape::Disk { radius: 2.0 }];
             let shape = &shapes[usize::from(case) % shapes.len()];

@@ -54,7 +54,10 @@ pub fn extract_lights(
                 })
                 .collect();
             let light = scaled(light, factor.map_or(1.0, |f| f.0 as f32));
-            (entity, PunctualLight { light, motion: MotionTransform::new(&keys) })
+            (
+                entity,
+                PunctualLight { light, motion: MotionTransform::through(&keys, motion.curved) },
+            )
         })
         .collect();
     found.sort_unstable_by_key(|(entity, _)| spawn_order(*entity));

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 /// shutter and both included.
 ///
 /// The way is cut at the keys. On a piece without rotation points run along straight lines, and the boxes
-/// at both ends hold it. With one, a point `q(s) = lerp(S₀p, S₁p, s)` is turned by `R(s)`, an angle `θ`
+/// at both ends hold it, or along a curve, for which they grow by how far it strays from its chord. With one, a point `q(s) = lerp(S₀p, S₁p, s)` is turned by `R(s)`, an angle `θ`
 /// in all. It strays from the chord between its two ends by at most
 /// `r(1 − cos ½θ) + ½·sin ½θ·|S₁p − S₀p|`, with `r` the greatest `|q|`: the sagitta of its arc, and what
 /// the change of its radius adds on the way. Boxes around both ends, padded by that, hold the piece.
@@ -21,28 +21,37 @@ pub fn swept_bounds(bounds: &Aabb, motion: &MotionTransform, begin: f32, end: f3
     }
     let corners = bounds.corners().map(glam::Vec3::as_dvec3);
     let mut all = Aabb::EMPTY;
-    let mut before: Option<Decomposed> = None;
-    for key in keys_between(motion, begin, end) {
-        let before = before.replace(key).unwrap_or(key);
-        let ends = bounds.transformed(&before.compose()).union(bounds.transformed(&key.compose()));
+    let mut before: Option<(f64, Decomposed)> = None;
+    for (position, key) in keys_between(motion, begin, end) {
+        let (from, before) = before.replace((position, key)).unwrap_or((position, key));
+        let mut ends =
+            bounds.transformed(&before.compose()).union(bounds.transformed(&key.compose()));
+        if position > from {
+            let k = from.floor();
+            let [least, most] = motion.strays(k as usize, [from - k, position - k]);
+            if least != most {
+                ends.min = (ends.min.as_dvec3() + least).as_vec3().map(f32::next_down);
+                ends.max = (ends.max.as_dvec3() + most).as_vec3().map(f32::next_up);
+            }
+        }
         let pad = bulge(&corners, &before, &key) + rounding(&corners, &before, &key);
         all = all.union(ends.inflated((pad as f32).next_up()));
     }
     all
 }
 
-/// The keys at both ends and those on the way.
+/// The keys at both ends and those on the way, each with its position, counted in segments.
 fn keys_between(
     motion: &MotionTransform,
     begin: f32,
     end: f32,
-) -> impl Iterator<Item = Decomposed> {
+) -> impl Iterator<Item = (f64, Decomposed)> {
     let count = motion.keys_translations().count();
     let position = |time: f32| f64::from(time) * (count - 1) as f64;
     let (from, to) = (position(begin), position(end));
     let inner = (0..count).filter(move |&k| from < k as f64 && (k as f64) < to);
-    let ends = [motion.key_at(begin), motion.key_at(end)];
-    let inner = inner.map(|k| motion.key(k));
+    let ends = [(from, motion.key_at(begin)), (to, motion.key_at(end))];
+    let inner = inner.map(|k| (k as f64, motion.key(k)));
     std::iter::once(ends[0]).chain(inner).chain(std::iter::once(ends[1]))
 }
 
@@ -89,7 +98,7 @@ mod tests {
         };
         let count = 2 + case % 4;
         let keys: Vec<_> = (0..count).map(|k| key(3.0 * f64::from(k) / f64::from(count))).collect();
-        MotionTransform::new(&keys)
+        MotionTransform::through(&keys, case.is_multiple_of(3))
     }
 
     /// Oracle: the box at many times of the part, both ends among them. It is inside; and not much

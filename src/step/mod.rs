@@ -16,8 +16,8 @@ mod waves;
 
 pub use deform::deform_meshes;
 pub use hierarchy::propagate_poses;
-pub use pose::{PoseInput, evaluate_optics_at, local_pose, pose_moving_entities};
-pub(crate) use shutter::merge_equal;
+pub use pose::{PoseInput, evaluate_fov_at, local_pose, pose_moving_entities};
+pub(crate) use shutter::ROUNDING;
 pub use shutter::sample_shutter;
 pub use views::survey_views;
 

@@ -1,6 +1,6 @@
 //! The pose of an entity in its parent's frame at an instant, in closed form.
 //!
-//! From the inside out: scale, the turn about a fixed axis, rotation, translation; velocity and
+//! From the inside out: what a matrix is beside its rotation, scale, the turn about a fixed axis, rotation, translation; velocity and
 //! acceleration then add to it. With `x₀` and `R₀` of the transform or its tracks,
 //!
 //! ```text
@@ -10,7 +10,8 @@
 //! A constant `ω` makes `exp(ω·t)` the rotation by `|ω|·t` about `ω`, exact at any time.
 
 use crate::description::{Acceleration, Keyframes, LookAt, Track, Transform, Velocity};
-use crate::world::{Camera, EmissionFactor, Light, LocalPose, SceneTime};
+use crate::math::TimeCurve;
+use crate::world::{Camera, EmissionFactor, Light, LocalPose, Optics, SceneTime};
 use bevy_ecs::prelude::*;
 use bevy_ecs::query::QueryData;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
@@ -74,7 +75,7 @@ pub fn local_pose(
     keyframes: Option<&Keyframes>,
     look_at: Option<(&LookAt, bool)>,
 ) -> DAffine3 {
-    let Transform { mut translation, mut rotation, mut scale } = *transform;
+    let Transform { mut translation, mut rotation, mut scale, stretch } = *transform;
     let mut turn = DQuat::IDENTITY;
     if let Some(keyframes) = keyframes {
         translation = keyframes.translation.as_ref().map_or(translation, |track| track.at(t));
@@ -94,7 +95,11 @@ pub fn local_pose(
     if let Some((aim, backwards)) = look_at {
         rotation = aimed(translation, aim, backwards).unwrap_or(rotation);
     }
-    DAffine3::from_scale_rotation_translation(scale, rotation * turn, translation)
+    let mut pose = DAffine3::from_scale_rotation_translation(scale, rotation * turn, translation);
+    if stretch != DMat3::IDENTITY {
+        pose.matrix3 *= stretch;
+    }
+    pose
 }
 
 /// The rotation which points local +z, or −z when `backwards`, from `eye` at the target, with local
@@ -107,15 +112,15 @@ fn aimed(eye: DVec3, aim: &LookAt, backwards: bool) -> Option<DQuat> {
     Some(DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)))
 }
 
-/// The keyed field of view (degrees) and focus distance (metres) of a camera at `t` seconds.
-pub fn evaluate_optics_at(
+/// The vertical field of view (degrees) of a camera at `t` seconds, for a picture of this size.
+pub fn evaluate_fov_at(
     t: f64,
     camera: &Camera,
     keyframes: Option<&Keyframes>,
-) -> (f64, Option<f64>) {
-    let fov = keyframes.and_then(|k| k.fov.as_ref()).map_or(camera.fov, |track| track.at(t));
-    let focus = keyframes.and_then(|k| k.focus.as_ref()).map(|track| track.at(t));
-    (fov, focus)
+    size: (u32, u32),
+) -> f64 {
+    let keyed = keyframes.and_then(|keys| keys.fov.as_ref());
+    keyed.map_or_else(|| camera.vertical_fov(size), |track| track.at(t))
 }
 
 /// An upper bound of the angular speed of the pose in its parent's frame, radians per second.
@@ -131,22 +136,47 @@ pub(super) fn angular_speed_bound(
     spin + keyed
 }
 
-/// The mean of the keyed emission factor over the shutter `[open, close]`, seconds.
-///
-/// The trapezoid rule on 64 intervals; exact for what is linear within each.
+/// The mean of the keyed emission factor over the shutter `[open, close]`, seconds: exactly, see [`Track::mean`].
 pub(super) fn mean_emission_factor(
     keyframes: &Keyframes,
     open: f64,
     close: f64,
 ) -> Option<EmissionFactor> {
-    const INTERVALS: u32 = 64;
-    let track = keyframes.emission.as_ref()?;
-    if close <= open {
-        return Some(EmissionFactor(track.at(open)));
+    Some(EmissionFactor(keyframes.emission.as_ref()?.mean(open, close)))
+}
+
+/// The field of view and the focus of a camera over the shutter `[open, close]`, seconds.
+pub(super) fn optics_over(
+    open: f64,
+    close: f64,
+    camera: &Camera,
+    keyframes: Option<&Keyframes>,
+    size: (u32, u32),
+) -> Optics {
+    /// Lines for each piece of a track that bends.
+    const SEGMENTS: u32 = 16;
+    let over = |track: &Track<f64>| {
+        let curve = track.curve(open, close, SEGMENTS);
+        let size = curve.values().fold(0.0, f64::max);
+        curve.merged(super::ROUNDING * size)
+    };
+    let fov = keyframes.and_then(|keys| keys.fov.as_ref());
+    Optics {
+        fov_deg: fov.map_or_else(|| TimeCurve::constant(camera.vertical_fov(size)), over),
+        focus: keyframes.and_then(|keys| keys.focus.as_ref()).map(over),
     }
-    let at = |k: u32| track.at(open + (close - open) * f64::from(k) / f64::from(INTERVALS));
-    let inner: f64 = (1..INTERVALS).map(at).sum();
-    Some(EmissionFactor((0.5 * (at(0) + at(INTERVALS)) + inner) / f64::from(INTERVALS)))
+}
+
+/// The shortest time between two keys of a pose in a span, see [`Track::shortest_gap`].
+pub(super) fn shortest_gap(keyframes: &Keyframes, span: [f64; 2], least: f64) -> Option<f64> {
+    let Keyframes { translation, rotation, turn, scale, .. } = keyframes;
+    let gaps = [
+        translation.as_ref().and_then(|track| track.shortest_gap(span, least)),
+        rotation.as_ref().and_then(|track| track.shortest_gap(span, least)),
+        turn.as_ref().and_then(|turn| turn.angle.shortest_gap(span, least)),
+        scale.as_ref().and_then(|track| track.shortest_gap(span, least)),
+    ];
+    gaps.into_iter().flatten().reduce(f64::min)
 }
 
 #[cfg(test)]

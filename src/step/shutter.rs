@@ -3,15 +3,16 @@
 //! The pose systems are asked at evenly spaced times from opening to closing. An entity keeps the
 //! smallest number of segments (a power of two) whose interpolation, [`Decomposed::interpolate`],
 //! passes through all the other samples within a tolerance: one key for what stands still, two for
-//! a straight line or a uniform rotation, more for an arc. While some entity is not satisfied the
-//! grid is doubled.
+//! a straight line or a uniform rotation, three and a curve for even acceleration, more for an arc. While some entity
+//! is not satisfied the grid is doubled.
 //!
 //! Sampling alone cannot see whole turns: a wheel which makes one turn between two samples looks at
 //! rest. The angular speeds of velocities and tracks, summed along the ancestors, are therefore
-//! turned into a least number of segments of at most 30°.
+//! turned into a least number of segments of at most 30°. Nor can they see what happens between two keys that lie
+//! closer than they do: the first grid has a sample on either side of every key.
 
-use super::pose::{angular_speed_bound, evaluate_optics_at, mean_emission_factor};
-use crate::math::Decomposed;
+use super::pose::{angular_speed_bound, mean_emission_factor, optics_over, shortest_gap};
+use crate::math::{Decomposed, curve_slopes, place_between};
 use crate::world::{
     Camera, ChildOf, Children, EmissionFactor, FrameClock, Keyframes, Optics, SceneTime, Settings,
     ShutterMotion, Velocity, WorldTransform,
@@ -28,8 +29,6 @@ const WIDEST_TURN: f64 = std::f64::consts::PI / 6.0;
 const COARSEST_GRID: usize = 4;
 /// Segments of the finest grid. A motion which needs more is given these.
 const FINEST_GRID: usize = 4096;
-/// Segments over which keyed fields of view and focus distances are joined by straight lines.
-const OPTICS_SEGMENTS: usize = 16;
 /// Motions that one thread fits keys to before it is worth asking another.
 const FITTED_AT_ONCE: usize = 64;
 /// Motion below this share of a coordinate is rounding noise of the matrix products in `f64`.
@@ -38,17 +37,7 @@ const NOISE: f64 = f64::EPSILON * 4096.0;
 /// What differs by less than this share of a coordinate is the same. Values between equal keys and each product in a chain of
 /// parents round a handful of times, by ε/2 each: room for chains of some ten. It is less than [`NOISE`], which is no more
 /// than a part of a motion that is kept, for what is below is not seen to move at all.
-const ROUNDING: f64 = f64::EPSILON * 64.0;
-
-/// Leaves the first of values at evenly spaced times where all are the same, but for the rounding of numbers as large
-/// as `size` from which they were computed.
-pub(crate) fn merge_equal(values: &mut Vec<f64>, size: f64) {
-    if let [first, rest @ ..] = &values[..]
-        && rest.iter().all(|value| value == first || (value - first).abs() <= ROUNDING * size)
-    {
-        values.truncate(1);
-    }
-}
+pub(crate) const ROUNDING: f64 = f64::EPSILON * 64.0;
 
 /// Runs the pose systems over the shutter and writes [`ShutterMotion`], [`Optics`] and
 /// [`EmissionFactor`] where they are different from before.
@@ -61,7 +50,8 @@ pub fn sample_shutter(world: &mut World) {
     let least = least_segments(world, close - open);
     let most_turning = least.values().copied().max().unwrap_or(1);
     let mut grid = if close > open {
-        (2 * most_turning.next_power_of_two()).clamp(COARSEST_GRID, FINEST_GRID)
+        let between_keys = segments_between_keys(world, open, close);
+        (2 * most_turning.next_power_of_two().max(between_keys)).clamp(COARSEST_GRID, FINEST_GRID)
     } else {
         0
     };
@@ -69,17 +59,17 @@ pub fn sample_shutter(world: &mut World) {
     let motions = loop {
         samples.take(world, open, close, grid);
         let motions = samples.motions(&least, tolerance);
-        if grid >= FINEST_GRID || motions.iter().all(|(_, known)| *known) {
+        if grid >= FINEST_GRID || motions.iter().all(|fit| fit.known) {
             break motions;
         }
         grid *= 2;
     };
-    for (entity, (keys, _)) in samples.entities.into_iter().zip(motions) {
+    for (entity, fit) in samples.entities.into_iter().zip(motions) {
         // An entity which was not there at every time has no keys.
-        if !keys.is_empty()
+        if !fit.motion.keys.is_empty()
             && let Some(mut motion) = world.get_mut::<ShutterMotion>(entity)
         {
-            motion.set_if_neq(ShutterMotion { keys });
+            motion.set_if_neq(fit.motion);
         }
     }
     sample_optics(world, open, close);
@@ -135,9 +125,8 @@ impl Samples {
         }
     }
 
-    /// For each entity the poses to keep and whether they describe its motion well enough; none for one
-    /// which was not there at every time.
-    fn motions(&self, least: &EntityHashMap<usize>, tolerance: f64) -> Vec<(Vec<DAffine3>, bool)> {
+    /// For each entity the poses to keep; none for one which was not there at every time.
+    fn motions(&self, least: &EntityHashMap<usize>, tolerance: f64) -> Vec<Fit> {
         self.entities
             .par_iter()
             .zip(&self.poses)
@@ -145,8 +134,8 @@ impl Samples {
             .map(|(entity, poses)| {
                 let least = least.get(entity).copied().unwrap_or(1);
                 match poses.split_first() {
-                    None => (Vec::new(), true),
-                    Some((here, _)) if least <= 1 && rests(poses) => (vec![*here], true),
+                    None => Fit::known(Vec::new(), false),
+                    Some((here, _)) if least <= 1 && rests(poses) => Fit::known(vec![*here], false),
                     Some(_) => fewest_keys(poses, least, tolerance),
                 }
             })
@@ -213,8 +202,21 @@ fn rests(poses: &[DAffine3]) -> bool {
     poses.iter().all(|pose| noise.covers(here, pose))
 }
 
-/// The poses to keep, and whether they describe the motion within the tolerance.
-fn fewest_keys(poses: &[DAffine3], least: usize, tolerance: f64) -> (Vec<DAffine3>, bool) {
+/// The poses to keep of a motion.
+struct Fit {
+    motion: ShutterMotion,
+    /// Whether they describe it within the tolerance.
+    known: bool,
+}
+
+impl Fit {
+    fn known(keys: Vec<DAffine3>, curved: bool) -> Self {
+        Self { motion: ShutterMotion { keys, curved }, known: true }
+    }
+}
+
+/// The poses to keep.
+fn fewest_keys(poses: &[DAffine3], least: usize, tolerance: f64) -> Fit {
     let grid = poses.len() - 1;
     let allowed = Allowance::of(poses, tolerance, NOISE);
     let split: Vec<Decomposed> = poses.iter().map(Decomposed::new).collect();
@@ -222,18 +224,46 @@ fn fewest_keys(poses: &[DAffine3], least: usize, tolerance: f64) -> (Vec<DAffine
     // A grid that is used up has no samples left to test against.
     while segments < grid {
         let stride = grid / segments;
-        let fits = (0..grid).all(|k| {
-            let (a, between) = (k / stride * stride, k % stride);
-            let share = between as f64 / stride as f64;
-            between == 0
-                || allowed.covers(&split[a].interpolate(&split[a + stride], share), &poses[k])
-        });
-        if fits {
-            return (poses.iter().step_by(stride).copied().collect(), true);
+        let kept = || poses.iter().step_by(stride).copied();
+        let fits = |slopes: &[DVec3]| {
+            (0..grid).all(|k| {
+                let (a, between) = (k / stride * stride, k % stride);
+                if between == 0 {
+                    return true;
+                }
+                let (ends, share) = ([a, a + stride], between as f64 / stride as f64);
+                let mut pose = split[ends[0]].interpolate(&split[ends[1]], share);
+                if !slopes.is_empty() {
+                    let slopes = ends.map(|end| slopes[end / stride]);
+                    let places = ends.map(|end| poses[end].translation);
+                    pose.translation = place_between(places, Some(slopes), share);
+                }
+                allowed.covers(&pose, &poses[k])
+            })
+        };
+        if fits(&[]) {
+            return Fit::known(kept().collect(), false);
+        }
+        // A curve bends as its keys ask: that it does so between them three samples must confirm.
+        if stride >= 4 && segments >= 2 {
+            let places: Vec<DVec3> = kept().map(|pose| pose.translation).collect();
+            if fits(&curve_slopes(&places)) {
+                return Fit::known(kept().collect(), true);
+            }
         }
         segments *= 2;
     }
-    (poses.to_vec(), false)
+    Fit { known: false, ..Fit::known(poses.to_vec(), false) }
+}
+
+/// How many segments of the shutter are as short as the time between two neighbouring keys of a pose, where keys are within
+/// it, a power of two; keys that are closer than the finest grid do not count.
+fn segments_between_keys(world: &mut World, open: f64, close: f64) -> usize {
+    let mut keyed = world.query::<&Keyframes>();
+    let least = (close - open) / FINEST_GRID as f64;
+    let gaps = keyed.iter(world).filter_map(|keys| shortest_gap(keys, [open, close], least));
+    let gap = gaps.fold(close - open, f64::min);
+    (((close - open) / gap).ceil() as usize).next_power_of_two().min(FINEST_GRID)
 }
 
 /// How far an interpolated pose may lie from the true one.
@@ -272,23 +302,12 @@ fn largest(m: DMat3) -> f64 {
 
 /// Writes the [`Optics`] of every camera.
 fn sample_optics(world: &mut World, open: f64, close: f64) {
+    let size = world.resource::<Settings>().0.size;
     let mut cameras = world.query::<(Entity, &Camera, Option<&Keyframes>)>();
     let sampled: Vec<(Entity, Optics)> = cameras
         .iter(world)
         .map(|(entity, camera, keyframes)| {
-            let mut optics = Optics::default();
-            for k in 0..=OPTICS_SEGMENTS {
-                let share = k as f64 / OPTICS_SEGMENTS as f64;
-                let (fov, focus) =
-                    evaluate_optics_at(open + (close - open) * share, camera, keyframes);
-                optics.fov_deg.push(fov);
-                optics.focus.extend(focus);
-            }
-            for values in [&mut optics.fov_deg, &mut optics.focus] {
-                let size = values.iter().copied().fold(0.0, f64::max);
-                merge_equal(values, size);
-            }
-            (entity, optics)
+            (entity, optics_over(open, close, camera, keyframes, size))
         })
         .collect();
     for (entity, optics) in sampled {
@@ -334,6 +353,11 @@ mod tests {
         &world.get::<ShutterMotion>(entity).expect("every placed entity has one").keys
     }
 
+    fn motion_of(world: &World, entity: Entity) -> MotionTransform {
+        let motion = world.get::<ShutterMotion>(entity).expect("every placed entity has one");
+        MotionTransform::through(&motion.keys, motion.curved)
+    }
+
     /// One key at rest, two on a line and in a uniform rotation about the own origin.
     #[test]
     fn simple_motion_needs_few_keys() {
@@ -353,14 +377,19 @@ mod tests {
         assert_eq!(keys(&world, line).len(), 1);
     }
 
-    /// Oracle: with acceleration `a` over `T` a chord of `1/S` of it strays by `a·T²/(8·S²)`.
+    /// Even acceleration is a parabola: a curve through three keys, which meets it at every time. Oracle: `½·a·t²`.
     #[test]
     fn accelerated_motion_is_followed_within_the_tolerance() {
         let (mut world, mut frame) = world_with_shutter(1.0);
         let body = world.spawn(crate::world::Acceleration(DVec3::X * 2.0)).id();
         frame.run(&mut world);
-        // 2/(8 S²) ≤ 0.001 · 1 m  ⇒  S ≥ 15.8
-        assert_eq!(keys(&world, body).len(), 17);
+        assert_eq!(keys(&world, body).len(), 3);
+        let motion = motion_of(&world, body);
+        for k in 0..=64_u8 {
+            let u = f32::from(k) / 64.0;
+            let x = f64::from(u * u);
+            assert!((motion.at(u).translation.x - x).abs() < 1e-14, "u = {u}");
+        }
     }
 
     /// Ten whole turns within the shutter are neither lost nor slowed down: every pose between the
@@ -371,7 +400,7 @@ mod tests {
         let speed = 20.0 * std::f64::consts::TAU;
         let wheel = world.spawn(Velocity { angular: DVec3::Z * speed, ..Velocity::default() }).id();
         frame.run(&mut world);
-        let motion = MotionTransform::new(keys(&world, wheel));
+        let motion = motion_of(&world, wheel);
         for k in 0..=997_u16 {
             let u = f32::from(k) / 997.0;
             let angle = speed * 0.5 * f64::from(u);
@@ -399,7 +428,7 @@ mod tests {
             ))
             .id();
         frame.run(&mut world);
-        let motion = MotionTransform::new(keys(&world, wheel));
+        let motion = motion_of(&world, wheel);
         for k in 0..=100_u8 {
             let u = f32::from(k) / 100.0;
             let t = 0.5 * f64::from(u);
@@ -437,7 +466,7 @@ mod tests {
         });
         let bob = world.spawn((Transform::default(), Pendulum)).id();
         frame.run(&mut world);
-        let motion = MotionTransform::new(keys(&world, bob));
+        let motion = motion_of(&world, bob);
         assert!(!motion.is_static());
         for k in 0..=50_u8 {
             let p = motion.at(f32::from(k) / 50.0).translation;

@@ -1,6 +1,6 @@
 //! From where the camera sees what is diced for it, over the whole sequence.
 
-use super::pose::evaluate_optics_at;
+use super::pose::evaluate_fov_at;
 use crate::description::modelling::{View, perspective_pixel};
 use crate::world::{
     ActiveCamera, Camera, Displacement, FrameClock, Keyframes, Mesh, SceneTime, Settings, Shape,
@@ -55,8 +55,8 @@ pub fn survey_views(world: &mut World) {
 
 /// Adds the views of this instant, unless they are as before.
 fn look(world: &mut World, seconds: f64, wanted: &mut EntityHashMap<Vec<View>>) {
-    let (width, height) = world.resource::<Settings>().0.size;
-    let (width, height) = (f64::from(width), f64::from(height));
+    let size = world.resource::<Settings>().0.size;
+    let (width, height) = (f64::from(size.0), f64::from(size.1));
     let active = world.query_filtered::<Entity, With<ActiveCamera>>().iter(world).min();
     let mut cameras = world.query::<(Entity, &Camera, &WorldTransform, Option<&Keyframes>)>();
     let chosen = active.or_else(|| cameras.iter(world).map(|camera| camera.0).min());
@@ -66,7 +66,7 @@ fn look(world: &mut World, seconds: f64, wanted: &mut EntityHashMap<Vec<View>>) 
     let pixel = if let Some(across) = camera.orthographic {
         (across / height, 0.0)
     } else {
-        let (fov, _) = evaluate_optics_at(seconds, camera, keyframes);
+        let fov = evaluate_fov_at(seconds, camera, keyframes, size);
         perspective_pixel((0.5 * fov.to_radians()).tan(), height, width / height)
     };
     let camera_from_world = pose.0.inverse();

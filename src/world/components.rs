@@ -6,7 +6,7 @@
 
 use crate::description::modelling::View;
 use crate::description::{self, Clock, GridData, ImageData, TriangleMesh};
-use crate::math::Aabb;
+use crate::math::{Aabb, TimeCurve};
 use bevy_ecs::component::{Mutable, RequiredComponentsRegistrator, StorageType};
 use bevy_ecs::prelude::*;
 use glam::DAffine3;
@@ -84,16 +84,17 @@ pub struct WorldTransform(pub DAffine3);
 pub struct ShutterMotion {
     /// World from object.
     pub keys: Vec<DAffine3>,
+    /// Whether a curve joins their translations, and not lines.
+    pub curved: bool,
 }
 
-/// Vertical field of view and focus of a camera over the shutter, at the times of its
-/// [`ShutterMotion`]. Written by the step stage.
-#[derive(Component, Clone, Debug, Default, PartialEq)]
+/// Vertical field of view and focus of a camera over the shutter. Written by the step stage.
+#[derive(Component, Clone, Debug, PartialEq)]
 pub struct Optics {
-    /// Vertical field of view in degrees at each key.
-    pub fov_deg: Vec<f64>,
-    /// Keyed focus distance in metres at each key; empty when the focus is not keyed.
-    pub focus: Vec<f64>,
+    /// Vertical field of view in degrees.
+    pub fov_deg: TimeCurve,
+    /// Keyed focus distance in metres.
+    pub focus: Option<TimeCurve>,
 }
 
 /// The mean over the shutter of the keyed factor on an emission or a light. Written by the step

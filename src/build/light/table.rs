@@ -310,8 +310,7 @@ impl Builder<'_> {
                 }
                 Light::Directional { .. } | Light::Sky { .. } => continue,
             };
-            let keys = light.motion.keys_translations();
-            let bounds = Aabb::from_points(keys.map(DVec3::as_vec3));
+            let bounds = Aabb::from_points(light.motion.hull().map(DVec3::as_vec3));
             let light = LightBounds { bounds, flux, cone, two_sided: false };
             self.table.of_punctual[index as usize] = self.add_near(Emitter::Punctual(index), light);
         }

@@ -93,6 +93,9 @@ fn read_camera(cursor: &Cursor, names: &Names, report: &mut Report) -> Option<Ca
         limits::number(report, &cursor.at(field), value, limits);
     };
     check("fov", camera.fov, &limits::FOV);
+    if let Some(fov_x) = camera.fov_x {
+        check("fov_x", fov_x, &limits::FOV);
+    }
     check("aperture", camera.aperture, &limits::LENGTH_OR_ZERO);
     check("blade_rotation", camera.blade_rotation, &limits::ANGLE);
     if let Some(height) = camera.orthographic {
@@ -107,7 +110,13 @@ fn read_camera(cursor: &Cursor, names: &Names, report: &mut Report) -> Option<Ca
     if camera.blades != 0 {
         check("blades", f64::from(camera.blades), &limits::BLADES);
     }
-    for (a, b) in [("aperture", "f_number"), ("f_number", "orthographic")] {
+    let excluded = [
+        ("aperture", "f_number"),
+        ("f_number", "orthographic"),
+        ("fov", "fov_x"),
+        ("orthographic", "fov_x"),
+    ];
+    for (a, b) in excluded {
         if let (Some(_), Some(second)) = (cursor.field(a), cursor.field(b)) {
             let message = format!("`{a}` and `{b}` exclude each other");
             report.at("scene::conflict", &second, message);

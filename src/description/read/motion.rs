@@ -6,7 +6,8 @@ use super::source::Cursor;
 use crate::description::{
     Acceleration, Extend, Interpolation, Key, Keyframes, LookAt, Track, Transform, Turn, Velocity,
 };
-use glam::{DMat3, DQuat, DVec3, EulerRot};
+use crate::math::Decomposed;
+use glam::{DAffine3, DMat3, DQuat, DVec3, DVec4, EulerRot};
 use serde::Deserialize;
 use serde::de::{self, Deserializer, SeqAccess, Visitor};
 use std::fmt;
@@ -25,6 +26,12 @@ struct TransformFile {
     look_at: Option<DVec3>,
     #[serde(default)]
     up: Option<DVec3>,
+    /// x, y, z, w.
+    #[serde(default)]
+    quaternion: Option<DVec4>,
+    /// Its rows, which are multiplied with a column.
+    #[serde(default)]
+    matrix: Option<Vec<DVec4>>,
 }
 
 /// One factor for all axes, or one for each.
@@ -172,7 +179,8 @@ pub(super) fn read_transform(cursor: &Cursor, report: &mut Report) -> Option<Pos
         ("look_at", file.look_at.unwrap_or_default(), &limits::COORDINATE),
         ("up", file.up.unwrap_or_default(), &limits::DIRECTION),
     ];
-    let mut fine = true;
+    let mut fine = excludes(cursor, "matrix", &MATRIX_EXCLUDES, report)
+        & excludes(cursor, "quaternion", &["rotation", "look_at"], report);
     for (name, value, limits) in fields {
         fine &= limits::vector(report, &cursor.at(name), &value.to_array(), limits);
     }
@@ -191,9 +199,78 @@ pub(super) fn read_transform(cursor: &Cursor, report: &mut Report) -> Option<Pos
         fine = false;
     }
     let look_at = file.look_at.map(|target| LookAt { target, up: file.up.unwrap_or(DVec3::Y) });
-    let rotation = rotation_from_degrees(rotation);
-    let transform = Transform { translation: file.translation, rotation, scale };
+    let rotation = match file.quaternion {
+        Some(quaternion) => read_quaternion(&cursor.at("quaternion"), quaternion, report)?,
+        None => rotation_from_degrees(rotation),
+    };
+    let transform = match &file.matrix {
+        Some(rows) => read_matrix(&cursor.at("matrix"), rows, report)?,
+        None => {
+            Transform { translation: file.translation, rotation, scale, ..Transform::default() }
+        }
+    };
     fine.then_some(Pose { transform, look_at, up_given: file.up.is_some() })
+}
+
+/// What a matrix says as well.
+const MATRIX_EXCLUDES: [&str; 5] = ["translation", "rotation", "scale", "look_at", "quaternion"];
+
+/// Reports fields that say the same as another; `false` if there are any.
+fn excludes(cursor: &Cursor, name: &str, others: &[&str], report: &mut Report) -> bool {
+    let Some(field) = cursor.field(name) else { return true };
+    let second = others.iter().find_map(|other| Some((other, cursor.field(other)?)));
+    let Some((other, second)) = second else { return true };
+    let message = format!("`{name}` and `{other}` exclude each other");
+    report.error("scene::conflict", second.key_place(), &field.path, message).help =
+        Some("leave one of them out".to_owned());
+    false
+}
+
+/// A rotation as x, y, z, w, of any length.
+fn read_quaternion(cursor: &Cursor, value: DVec4, report: &mut Report) -> Option<DQuat> {
+    if !limits::vector(report, cursor, &value.to_array(), &limits::DIRECTION) {
+        return None;
+    }
+    let unit = value.try_normalize().map(DQuat::from_vec4);
+    if unit.is_none() {
+        let message = "a quaternion must not be zero; no rotation is (0, 0, 0, 1)";
+        report.at("scene::out-of-range", cursor, message);
+    }
+    unit
+}
+
+/// A pose as the rows of a matrix: three, or four of which the last says nothing.
+fn read_matrix(cursor: &Cursor, rows: &[DVec4], report: &mut Report) -> Option<Transform> {
+    if !(rows.len() == 3 || rows.len() == 4 && rows[3] == DVec4::W) {
+        let message = "a matrix is its three rows of four numbers, `[(1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, z)]` for a \
+                       translation, perhaps with (0, 0, 0, 1) as a fourth row";
+        let last_column = rows.len() == 4 && rows[..3].iter().all(|row| row.w == 0.0);
+        report.at("scene::wrong-type", cursor, message).help = last_column.then(|| {
+            "these seem to be its columns: write its rows, the translation in the last column"
+                .to_owned()
+        });
+        return None;
+    }
+    let mut fine = true;
+    for (index, row) in rows.iter().take(3).enumerate() {
+        let place = cursor.nth(index);
+        fine &= limits::vector(report, &place, &row.truncate().to_array(), &limits::SCALE)
+            & limits::number(report, &place.nth(3), row.w, &limits::COORDINATE);
+    }
+    if !fine {
+        return None;
+    }
+    let [x, y, z] = [0, 1, 2].map(|row| rows[row].truncate());
+    let linear = DMat3::from_cols(x, y, z).transpose();
+    let translation = DVec3::new(rows[0].w, rows[1].w, rows[2].w);
+    if linear.determinant() == 0.0 {
+        let message = "the matrix flattens space: its determinant must not be zero";
+        report.at("scene::out-of-range", cursor, message);
+        return None;
+    }
+    let parts = Decomposed::new(&DAffine3 { matrix3: linear, translation });
+    let Decomposed { rotation, stretch, .. } = parts;
+    Some(Transform { translation, rotation, stretch, ..Transform::default() })
 }
 
 /// Reads `velocity: (…)`.

@@ -54,6 +54,41 @@ fn rotations_turn_about_x_first_and_z_last() {
     assert!((rotation * DVec3::Z - DVec3::Y).length() < 1e-15);
 }
 
+/// Oracle: the same pose in angles; a shear, which no angles have, by its matrix.
+#[test]
+fn poses_are_given_as_a_quaternion_or_a_matrix_as_well() {
+    use glam::{DAffine3, DMat3, DVec3};
+    let pose = |transform: &str| {
+        let text = with_entity(&format!("transform: ({transform})"));
+        let t = scene(&text).entities["it"].transform.unwrap();
+        DAffine3::from_scale_rotation_translation(t.scale, t.rotation, t.translation)
+            * DAffine3::from_mat3(t.stretch)
+    };
+    let angles = pose("translation: (1, 2, 3), rotation: (0, 90, 0), scale: (2, 1, 1)");
+    for same in [
+        "translation: (1, 2, 3), quaternion: (0, 3, 0, 3), scale: (2, 1, 1)",
+        "matrix: [(0, 0, 1, 1), (0, 1, 0, 2), (-2, 0, 0, 3)]",
+        "matrix: [(0, 0, 1, 1), (0, 1, 0, 2), (-2, 0, 0, 3), (0, 0, 0, 1)]",
+    ] {
+        assert!(pose(same).abs_diff_eq(angles, 1e-14), "{same}: {:?}", pose(same));
+    }
+    let sheared = pose("matrix: [(-1, 0.5, 0, 0), (0, 1, 0, 0), (0, 0, 3, 0)]");
+    let expected = DMat3::from_cols(DVec3::NEG_X, DVec3::new(0.5, 1.0, 0.0), DVec3::Z * 3.0);
+    assert!(sheared.matrix3.abs_diff_eq(expected, 1e-14), "{sheared:?}");
+    for (wrong, words) in [
+        ("matrix: [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0)], scale: 2", "`matrix` and `scale`"),
+        ("quaternion: (0, 0, 0, 1), rotation: (0, 0, 0)", "`quaternion` and `rotation`"),
+        ("quaternion: (0, 0, 0, 0)", "must not be zero"),
+        ("matrix: [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (5, 6, 7, 1)]", "its columns"),
+        ("matrix: [(1, 0, 0, 0), (0, 1, 0, 0)]", "three rows"),
+        ("matrix: [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 0)]", "flattens"),
+    ] {
+        let text = with_entity(&format!("transform: ({wrong})"));
+        let told = mistakes(&text);
+        assert!(told.contains(words), "{wrong}: {told}");
+    }
+}
+
 /// Oracle: where the axes must point, worked out by hand.
 #[test]
 fn look_at_aims_cameras_backwards_and_shapes_forwards() {
