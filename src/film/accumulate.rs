@@ -186,7 +186,7 @@ impl Film {
     /// An empty buffer for a tile of this film.
     ///
     /// # Panics
-    /// When the tile is not part of the film, or when there is no memory for a tile.
+    /// When the tile is not part of the film.
     pub fn tile_buffer(&self, tile: Tile) -> TileBuffer {
         assert!(
             tile.x0 <= tile.x1

@@ -126,11 +126,7 @@ const WORDS: [Word; 97] = [
     ("infinite", "Sky", "`Sky(radiance: …)`"),
     ("hdri", "Sky", "`Sky(radiance: \"texture\")`"),
     ("color", "intensity", "`intensity`, a number or a colour in W/sr"),
-    (
-        "focallength",
-        "fov",
-        "`fov`, vertical, in degrees: 2·atan(12 / f) for f mm on a frame of 36 × 24 mm",
-    ),
+    ("focallength", "fov", "`fov_x` in degrees: 2·atan(18 / f) for f mm on a frame 36 mm wide"),
     ("fstop", "f_number", "`f_number`"),
     // The scene and its settings.
     (
