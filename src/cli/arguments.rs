@@ -74,8 +74,8 @@ pub struct RenderArguments {
 
     /// Which frames: 5, 0-47, 0-99:3 (every third), or 9,10,15-20 [default: the scene's]
     ///
-    /// They are rendered in the order given. Frames outside the scene's own range are allowed, and
-    /// so are those before time 0: -5, -12--1.
+    /// They are rendered in the order given. Frames outside the scene's own range are allowed,
+    /// and so are those before time 0: -5, -12--1.
     #[arg(
         short = 'f',
         long,

@@ -379,12 +379,12 @@ fn strips(length: f64) -> RawMesh {
     mesh
 }
 
-/// A ray down to a ground of such strips, from between a millimetre and ten metres above it to a place up to
+/// A ray down to a ground of such strips, from between a millimetre and ten metres above `lift` to a place up to
 /// nearly its end.
-fn down(length: f64, number: u64) -> LocalRay {
+fn down(length: f64, lift: f64, number: u64) -> LocalRay {
     let mut u = Uniforms(number);
     let mut one = || f64::from(u.one());
-    let o = DVec3::new(one() - 0.5, 10.0_f64.powf(4.0 * one() - 3.0), one() - 0.5);
+    let o = DVec3::new(one() - 0.5, lift + 10.0_f64.powf(4.0 * one() - 3.0), one() - 0.5);
     let away = 10.0_f64.powf(one() * (0.45 * length).log10());
     let target = DVec3::new(10.0 * one() - 5.0, 0.0, if one() < 0.5 { away } else { -away });
     LocalRay { o, d: (target - o).normalize() }
@@ -402,7 +402,7 @@ fn ground_of_long_thin_strips_lets_no_ray_through() {
         let quality = BvhQuality::ALL[exponent as usize % 3];
         let tree = WideTree::build_with_budget(&mesh, quality, SPLITS);
         for number in 0..300 {
-            let ray = down(length, number);
+            let ray = down(length, 0.0, number);
             let turned = |v: DVec3| {
                 let turns = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
                 DVec3::from_array(turns[axis].map(|k| v[k]))
@@ -434,10 +434,9 @@ fn turned_ground_of_long_thin_strips_lets_no_ray_through() {
         let mesh = mesh_of(strips(length).map(|p| (turn * p.as_dvec3()).as_vec3()));
         let tree = WideTree::build_with_budget(&mesh, BvhQuality::Balanced, SPLITS);
         for number in 0..600 {
-            let ray = down(length, number);
-            // Above what the rounding of the corners lifts.
-            let o = turn * (ray.o + DVec3::Y * 0.1);
-            let ray = LocalRay { o, d: turn * ray.d };
+            // From above what the rounding of the corners lifts.
+            let ray = down(length, 0.1, number);
+            let ray = LocalRay { o: turn * ray.o, d: turn * ray.d };
             for with in all_instructions() {
                 let hit = tree.closest_hit_by(with, &ray, f64::INFINITY);
                 assert!(hit.is_some(), "{length:e} m, ray {number} by {with:?} passes: {ray:?}");
