@@ -188,7 +188,9 @@ impl<'a> Cursor<'a> {
             if !entry.path.is_empty() && !name.is_empty() {
                 entry.path.push('.');
             }
-            entry.path.push_str(name);
+            // Paths are shown; a name may hold what a terminal would obey.
+            let shown = |letter: char| if letter.is_control() { '\u{fffd}' } else { letter };
+            entry.path.extend(name.chars().map(shown));
         };
         if !self.path.is_empty() && self.name() != "Some" {
             step(self.name());
