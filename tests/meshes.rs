@@ -85,7 +85,7 @@ fn photons_leave_a_mesh_as_they_leave_a_rectangle() {
 fn ball(levels: u32, terminator: Terminator) -> Picture {
     let text = format!(
         r#"(
-        render: (max_depth: 1, integrator: Path, filter: Box(), layers: [Beauty, Normal, Position]),
+        render: (max_depth: 1, integrator: Path, filter: Box(), layers: [Beauty, Normal, Position], layer_filter: Mean),
         materials: {{"white": Diffuse(albedo: (1, 1, 1))}},
         meshes: {{ {} }},
         entities: {{

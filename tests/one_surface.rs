@@ -100,7 +100,6 @@ fn assert_lit(mirror: bool, methods: &[&str]) {
             let text = in_the_sun(shape, material, mirror, settings);
             let found = mean_of_seeds(&text, (3, 3), 2);
             let what = format!("{shape}, {material}, {settings}: {found:?}, {expected}");
-            println!("{what}");
             let allowed = 4.0 * found.error + 5e-3 * expected;
             assert!((found.mean - expected).abs() < allowed, "{what}");
             assert!(found.error < 0.03 * expected, "{what}");
@@ -171,7 +170,6 @@ fn no_field_is_gathered_twice_or_not_at_all() {
         ] {
             let found = of(settings);
             let what = format!("{metal}, {settings}: {found:?}, {expected:?}");
-            println!("{what}");
             let allowed = 3.0 * found.error.hypot(expected.error) + 0.025 * expected.mean;
             assert!((found.mean - expected.mean).abs() < allowed, "{what}");
         }
