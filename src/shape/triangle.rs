@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 /// Along the ray this is not as sound as across: of a strip `r` times as long as its distance `t` loses `r²`
 /// roundings. So a bound of them decides whether the sign of `t`, and for a hit its size, is known; where it is
 /// not, in some rays of a million, `t` is computed in twice the bits. What is hit has a `t` which is right to
-/// [`T_ERROR`], less than the boxes of a tree of `f32` allow for.
+/// half a rounding of `f32`, less than the boxes of a tree of `f32` allow for.
 #[derive(Clone, Copy, Debug)]
 pub struct TriangleTest {
     pub(crate) o: DVec3,
