@@ -216,8 +216,7 @@ fn beyond_photons(
     if any(is_sharp) && planes.len() > 1 && planes.iter().any(casts) {
         return Some(
             "a `Directional` light without an angle meets a smooth `Plane`: what that sends on to another `Plane` far from \
-             all else stays dark; give the light an `angle` (the sun's is 0.53), or use a `Rectangle` in place of the \
-             `Plane`"
+             all else stays dark; use a `Rectangle` in place of the smooth `Plane`"
                 .to_owned(),
         );
     }
